@@ -1,0 +1,48 @@
+# Every target sets up .venv by itself, once, and again when the files below change.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+CORPUS ?= ../shared/corpus
+BASELINE ?= build/corpus-baseline.jsonl
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check generate samples bench accuracy corpus-diff clean
+
+help:  ## list these targets
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
+
+$(READY): pyproject.toml constraints-dev.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints-dev.txt -e '.[dev]'
+	@touch $@
+
+demo: $(READY)  ## audit the samples: exit 1 (findings) is what they are for, 2 and 3 are failures
+	$(BIN)/mavframecheck check samples || [ $$? -eq 1 ]
+
+test: $(READY)  ## run every test
+	$(BIN)/python -m pytest
+
+check: $(READY)  ## lint, format, types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+generate: $(READY)  ## write again what is generated into the package
+	$(BIN)/python -m mavframecheck.wire.generate
+
+samples: $(READY)  ## write samples/ again
+	$(BIN)/python -m samples.make
+
+bench: $(READY)  ## speed and memory against the required figures (about five minutes)
+	$(BIN)/python -m benchmarks.bench --corpus $(CORPUS)
+
+accuracy: $(READY)  ## found, missed and false alarms on the labelled recordings
+	$(BIN)/python -m benchmarks.accuracy --corpus $(CORPUS)
+
+corpus-diff: $(READY)  ## findings added and removed since `make corpus-diff SAVE=--save`
+	$(BIN)/python -m benchmarks.corpus_diff --corpus $(CORPUS) --baseline $(BASELINE) $(SAVE)
+
+clean:  ## remove everything that make made
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,317 @@
+"""Checks of the byte stream itself: damage, losses, duplicates, ids that nobody can judge."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.model import Damage, Subject
+from mavframecheck.vehicle import Context
+from mavframecheck.wire import Batch, Frames
+from mavframecheck.wire.frames import STAMP
+from mavframecheck.wire.framing import CUT_OFF
+
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+
+class _Span:
+    """First and last frame of something, and how often it was there."""
+
+    def __init__(self) -> None:
+        self.first: Place | None = None
+        self.last: Place | None = None
+        self.count = 0
+
+    def add(self, frames: Frames, rows: Bools) -> None:
+        """Add the frames at `rows`."""
+        found = np.flatnonzero(rows)
+        if not len(found):
+            return
+        self.first = self.first or place(frames, int(found[0]))
+        self.last = place(frames, int(found[-1]))
+        self.count += len(found)
+
+    def observation(
+        self, subject: Subject, count: int | None = None, **values: object
+    ) -> Iterator[Observation]:
+        """Yield an observation, if there was anything."""
+        if self.first is not None and self.last is not None:
+            yield Observation(subject, self.first, self.last, count or self.count, values)  # type: ignore[arg-type]
+
+
+class ChecksumFailures(Check):
+    """Frames of known messages whose checksum fails, with a record right behind them."""
+
+    def __init__(self, *args: object) -> None:
+        """Count nothing yet."""
+        super().__init__(*args)  # type: ignore[arg-type]
+        self._span = _Span()
+        self._known = 0
+        self._failed: Counter[int] = Counter()
+        self._held: Counter[int] = Counter()
+
+    def update(self, batch: Batch, _context: Context) -> None:
+        """Count the frames whose checksum holds and fails, by message id."""
+        frames = batch.frames
+        failed = frames.known & ~frames.crc_ok
+        self._known += int(np.count_nonzero(frames.known))
+        self._span.add(frames, failed)
+        self._failed.update(frames.msgid[failed].tolist())
+        if self._failed:
+            ids = np.fromiter(self._failed, np.int32)
+            self._held.update(frames.msgid[frames.crc_ok & np.isin(frames.msgid, ids)].tolist())
+
+    def finish(self) -> Iterable[Observation]:
+        """Return one observation for the whole recording."""
+        always = [
+            i
+            for i, n in self._failed.items()
+            if n >= self.params["min_always"] and not self._held[i]
+        ]
+        names = [self.dialect.layouts[msgid].name for msgid, _ in self._failed.most_common(5)]
+        hint = ""
+        if always:
+            hint = (
+                f" {', '.join(self.dialect.layouts[i].name for i in always)} never has a good checksum: its sender "
+                "uses another definition of the message (--dialect tells which)."
+            )
+        return self._span.observation(
+            Subject(),
+            frames=self._span.count,
+            share=self._span.count / max(self._known, 1),
+            messages=", ".join(names),
+            hint=hint,
+        )
+
+    def verdict(self) -> Verdict:
+        """Return the frames of known messages."""
+        return Verdict(self._known)
+
+
+class StrayBytes(Check):
+    """Byte ranges that hold no frame."""
+
+    def __init__(self, *args: object) -> None:
+        """Count nothing yet."""
+        super().__init__(*args)  # type: ignore[arg-type]
+        self._frames = 0
+        self._before: Place | None = None
+        self._first: Place | None = None
+        self._last: Place | None = None
+        self._open: Damage | None = None
+        self._ranges = 0
+        self._bytes = 0
+        self._end = 0
+
+    def update(self, batch: Batch, _context: Context) -> None:
+        """Count damaged ranges; ranges that touch are one."""
+        frames = batch.frames
+        for damage in batch.damage:
+            if self._open is not None and self._open.offset + self._open.length == damage.offset:
+                self._open = Damage(
+                    self._open.offset, self._open.length + damage.length, self._open.reason
+                )
+            else:
+                self._close()
+                self._open = damage
+            self._last = self._place(damage, frames)
+            self._first = self._first or self._last
+        if len(frames):
+            self._frames += len(frames)
+            self._before = place(frames, len(frames) - 1)
+            self._end = max(self._end, self._before.offset + self._before.size)
+
+    def _place(self, damage: Damage, frames: Frames) -> Place:
+        """Return a damaged range with the number and time of the frame before it."""
+        row = int(np.searchsorted(frames.offset, damage.offset)) - 1
+        before = place(frames, row) if row >= 0 else self._before
+        number, t_us = (before.number, before.t_us) if before is not None else (0, None)
+        return Place(number, t_us, damage.offset, damage.length)
+
+    def _close(self) -> None:
+        if self._open is not None:
+            self._ranges += 1
+            self._bytes += self._open.length
+        self._open = None
+
+    def finish(self) -> Iterable[Observation]:
+        """Return one observation for the whole recording."""
+        last_range = self._open
+        self._close()
+        if self._first is None or self._last is None:
+            return
+        torn = (
+            self._ranges == 1
+            and last_range is not None
+            and last_range.offset >= self._end
+            and (last_range.reason == CUT_OFF or last_range.length <= STAMP)
+        )
+        values = {"ranges": self._ranges, "bytes": self._bytes, "only_torn_tail": torn}
+        yield Observation(Subject(), self._first, self._last, self._ranges, values)
+
+    def verdict(self) -> Verdict:
+        """Return the frames read."""
+        return Verdict(self._frames)
+
+
+class UnknownIds(Check):
+    """Frames whose message id the dialect lacks."""
+
+    def __init__(self, *args: object) -> None:
+        """Count nothing yet."""
+        super().__init__(*args)  # type: ignore[arg-type]
+        self._span = _Span()
+        self._frames = 0
+        self._ids: Counter[int] = Counter()
+
+    def update(self, batch: Batch, _context: Context) -> None:
+        """Count unknown ids."""
+        unknown = ~batch.frames.known
+        self._frames += len(batch.frames)
+        self._span.add(batch.frames, unknown)
+        self._ids.update(batch.frames.msgid[unknown].tolist())
+
+    def finish(self) -> Iterable[Observation]:
+        """Return one observation for the whole recording."""
+        listed = ", ".join(f"{msgid} ({count})" for msgid, count in self._ids.most_common(10))
+        return self._span.observation(
+            Subject(), frames=self._span.count, ids=listed, dialect=self.dialect.name
+        )
+
+    def verdict(self) -> Verdict:
+        """Return the frames read."""
+        return Verdict(self._frames)
+
+
+class LostFrames(Check):
+    """Gaps in the sequence counter of a sender."""
+
+    def __init__(self, *args: object) -> None:
+        """Know no sender yet."""
+        super().__init__(*args)  # type: ignore[arg-type]
+        self._last: dict[int, int] = {}
+        self._received: Counter[int] = Counter()
+        self._lost: Counter[int] = Counter()
+        self._backwards: Counter[int] = Counter()
+        self._spans: dict[int, _Span] = {}
+
+    def update(self, batch: Batch, _context: Context) -> None:
+        """Follow each counter through the batch."""
+        frames = batch.frames
+        counted = frames.crc_ok | ~frames.known
+        rows = np.flatnonzero(counted)
+        sender = frames.sender[rows]
+        order = np.argsort(sender.astype(np.uint16), kind="stable")
+        edges = np.flatnonzero(np.diff(sender[order])) + 1
+        for group in np.split(rows[order], edges):
+            if len(group):
+                self._follow(
+                    int(frames.sysid[group[0]]) * 256 + int(frames.compid[group[0]]), frames, group
+                )
+
+    def _follow(self, sender: int, frames: Frames, rows: Ints) -> None:
+        if sender not in self._last and len(self._last) >= MAX_COUNTERS:
+            return
+        seq = frames.seq[rows].astype(np.int64)
+        before = np.concatenate(([self._last.get(sender, int(seq[0]) - 1)], seq[:-1]))
+        step = (seq - before) % 256
+        gap = (step > 1) & (step <= self.params["max_gap"])
+        self._backwards[sender] += int(
+            np.count_nonzero((step == 0) | (step > self.params["max_gap"]))
+        )
+        self._received[sender] += len(rows)
+        self._lost[sender] += int((step[gap] - 1).sum())
+        self._last[sender] = int(seq[-1])
+        holes = np.zeros(len(frames), np.bool_)
+        holes[rows[gap]] = True
+        self._spans.setdefault(sender, _Span()).add(frames, holes)
+
+    def finish(self) -> Iterable[Observation]:
+        """Return one observation per sender that lost more than the rule allows."""
+        for sender in sorted(self._spans):
+            received, lost = self._received[sender], self._lost[sender]
+            share = lost / max(received + lost, 1)
+            if (
+                self._one_counter(sender)
+                and lost >= self.params["min_lost"]
+                and share >= self.params["min_share"]
+            ):
+                subject = Subject(sender >> 8, sender & 0xFF)
+                yield from self._spans[sender].observation(
+                    subject, lost=lost, share=share, received=received
+                )
+
+    def _one_counter(self, sender: int) -> bool:
+        """Return whether the counter of a sender runs forward, as one on a single link does."""
+        return (
+            self._backwards[sender] <= self.params["max_backwards_share"] * self._received[sender]
+        )
+
+    def verdict(self) -> Verdict:
+        """Return the frames of senders with one running counter."""
+        judged = sum(n for sender, n in self._received.items() if self._one_counter(sender))
+        if self._received and not judged:
+            return Verdict(
+                0, "every sender's sequence counter runs backwards: several links in one recording"
+            )
+        return Verdict(judged)
+
+
+class DuplicatedTraffic(Check):
+    """The same frame twice within a short stretch: two links merged, or a routing loop."""
+
+    def __init__(self, *args: object) -> None:
+        """Remember nothing yet."""
+        super().__init__(*args)  # type: ignore[arg-type]
+        self._recent: Ints = np.zeros(0, np.int64)
+        self._recent_number: Ints = np.zeros(0, np.int64)
+        self._frames: Counter[int] = Counter()
+        self._twice: Counter[int] = Counter()
+        self._spans: dict[int, _Span] = {}
+
+    def update(self, batch: Batch, _context: Context) -> None:
+        """Look each frame up among those of the last `window` frames."""
+        frames = batch.frames
+        rows = np.flatnonzero(frames.crc_ok)
+        if not len(rows):
+            return
+        key = (frames.sender[rows] << 48) | (frames.checksum[rows].astype(np.int64) << 32)
+        key |= (frames.seq[rows].astype(np.int64) << 24) | (frames.msgid[rows] & 0xFFFFFF)
+        keys = np.concatenate((self._recent, key))
+        numbers = np.concatenate((self._recent_number, frames.number[rows]))
+        order = np.argsort(keys, kind="stable")
+        same = (np.diff(keys[order]) == 0) & (np.diff(numbers[order]) <= self.params["window"])
+        again = order[1:][same]
+        repeated = np.zeros(len(frames), np.bool_)
+        repeated[rows[again[again >= len(self._recent)] - len(self._recent)]] = True
+        self._count(frames, rows, repeated)
+        kept = numbers > frames.number[-1] - self.params["window"]
+        self._recent, self._recent_number = keys[kept], numbers[kept]
+
+    def _count(self, frames: Frames, rows: Ints, repeated: Bools) -> None:
+        for sysid, count in zip(*np.unique(frames.sysid[rows], return_counts=True), strict=True):
+            self._frames[int(sysid)] += int(count)
+        for sysid in np.unique(frames.sysid[repeated]).tolist():
+            mine = repeated & (frames.sysid == sysid)
+            self._twice[sysid] += int(np.count_nonzero(mine))
+            self._spans.setdefault(sysid, _Span()).add(frames, mine)
+
+    def finish(self) -> Iterable[Observation]:
+        """Return one observation per system of which more came twice than the rule allows."""
+        for sysid, twice in sorted(self._twice.items()):
+            share = twice / self._frames[sysid]
+            if twice >= self.params["min_frames"] and share >= self.params["min_share"]:
+                yield from self._spans[sysid].observation(Subject(sysid), frames=twice, share=share)
+
+    def verdict(self) -> Verdict:
+        """Return the frames looked at."""
+        return Verdict(sum(self._frames.values()))
+
+
+MAX_COUNTERS = 256
+"""Senders whose counters are followed."""

@@ -1,0 +1,63 @@
+"""The `mavframecheck` command and the table of its subcommands, imported only when used."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from types import TracebackType
+from typing import Any
+
+import click
+
+from mavframecheck import __version__
+
+COMMANDS = {
+    "check": "Judge recordings and missions; exit 1 on findings.",
+    "inspect": "Show what the numbers of a recording mean: the map of its streams.",
+    "rules": "List the rules.",
+    "rule": "Explain one rule.",
+}
+"""Name and one line of help. `mavframecheck.cli.NAME` holds the command, called NAME."""
+
+
+class _Lazy(click.Group):
+    """Imports a subcommand when it is run: listing them all must cost nothing."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return super().get_command(ctx, cmd_name)
+        command = getattr(import_module(f"mavframecheck.cli.{cmd_name}"), cmd_name)
+        return command if isinstance(command, click.Command) else None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+    def main(self, args: Sequence[str] | None = None, *rest: Any, **extra: Any) -> Any:
+        """Run the command; as a process of its own (no `args`), also answer for its failures."""
+        if args is None:
+            sys.excepthook = _internal_error
+        return super().main(args, *rest, **extra)
+
+
+def _internal_error(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """Show the traceback and leave with 2: Python's own 1 would read as "there are findings"."""
+    sys.__excepthook__(kind, error, trace)
+    sys.stderr.flush()
+    os._exit(2)
+
+
+@click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="mavframecheck")
+def main() -> None:
+    """Find numbers in MAVLink streams that do not mean what somebody thinks.
+
+    Wrong frames, altitude references, units, type masks, time: in recorded logs and in missions.
+    """

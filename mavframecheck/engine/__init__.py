@@ -1,0 +1,16 @@
+"""Rules over rows: loading, expressions, running, episodes, verdicts."""
+
+from mavframecheck.engine.check import check_file, check_recording
+from mavframecheck.engine.compiled import Pack, RuleFileError
+from mavframecheck.engine.pack import load_pack
+from mavframecheck.engine.settings import Settings, SettingsError
+
+__all__ = [
+    "Pack",
+    "RuleFileError",
+    "Settings",
+    "SettingsError",
+    "check_file",
+    "check_recording",
+    "load_pack",
+]

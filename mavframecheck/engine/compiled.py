@@ -1,0 +1,206 @@
+"""Rules made ready to run: expressions compiled, texts parsed, and bound to the messages they judge."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from mavframecheck.engine.expression import ANY_NAME, Expression, ExpressionError
+from mavframecheck.engine.template import Template
+from mavframecheck.model import Rule
+from mavframecheck.semantics import catalogue
+from mavframecheck.semantics.commands import location_commands
+from mavframecheck.semantics.constants import constant
+from mavframecheck.semantics.enums import FrameKind, Quantity
+from mavframecheck.semantics.mavframe import frames_of
+from mavframecheck.semantics.tags import Condition, FieldTag
+
+OWN_NAMES = frozenset({"message", "field"})
+"""Names that every rule knows: the message and the field that it is looking at."""
+ALWAYS_KNOWN = frozenset({"sender.role"})
+"""Context that never has to be waited for."""
+
+
+class RuleFileError(Exception):
+    """A rule file that cannot be used; the text names file, key and column."""
+
+
+class CompiledRule:
+    """A rule with its expressions compiled and its parameters fixed."""
+
+    def __init__(self, rule: Rule, params: Mapping[str, Any], source: str) -> None:
+        """Compile `rule` from the file `source` with `params` in place of its own."""
+        self.rule = rule
+        self.params = {**rule.params, **params}
+        self._source = source
+        names = frozenset(self.params) | OWN_NAMES
+        self.lets: dict[str, Expression] = {}
+        for name, code in rule.let.items():
+            self.lets[name] = self._expression(code, names, f"let.{name}")
+            names |= {name}
+        self.when = self._expression(rule.detect.when, names, "detect.when")
+        self.flag = self._expression(rule.detect.flag, names, "detect.flag")
+        self.worst = self._expression(rule.detect.worst, names, "detect.worst")
+        if rule.detect.check:
+            names |= {ANY_NAME}
+        self.severities = [
+            (self._expression(case.condition, names, f"severity_when[{k}]"), case.severity)
+            for k, case in enumerate(rule.severity_when)
+        ]
+        self.text = self._template(rule.explain.text, names, "explain.text")
+        self.fix = self._template(rule.explain.fix, names, "explain.fix")
+        self.evidence = {
+            key: self._template(text, names, f"evidence.{key}")
+            for key, text in rule.evidence.items()
+        }
+
+    @property
+    def required(self) -> frozenset[str]:
+        """Context that a row must have before it is judged."""
+        found = {"vehicle.autopilot"} if self.rule.applies.autopilot else set()
+        return frozenset(found.union(*map(self._contexts, (self.when, self.flag))) - ALWAYS_KNOWN)
+
+    @property
+    def wanted(self) -> frozenset[str]:
+        """Context that severity and words speak of: worth waiting for, not needed to judge."""
+        spoken = [condition for condition, _ in self.severities]
+        for template in (self.text, self.fix, *self.evidence.values()):
+            spoken += template.expressions
+        return frozenset(set().union(*map(self._contexts, (self.worst, *spoken))) - ALWAYS_KNOWN)
+
+    def _contexts(self, expression: Expression | None) -> set[str]:
+        if expression is None:
+            return set()
+        nested = [self._contexts(self.lets[n]) for n in expression.used_names if n in self.lets]
+        return set(expression.contexts).union(*nested)
+
+    def _expression(self, code: str, names: frozenset[str], key: str) -> Any:
+        if not code:
+            return None
+        try:
+            return Expression(code, names)
+        except ExpressionError as error:
+            message = f"{self._source}: {key}, column {error.column}: {error}"
+            raise RuleFileError(message) from error
+
+    def _template(self, text: str, names: frozenset[str], key: str) -> Template:
+        try:
+            return Template(text, names)
+        except ExpressionError as error:
+            message = f"{self._source}: {key}, column {error.column}: {error}"
+            raise RuleFileError(message) from error
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """A rule on one message: all rows of it, or the view of one tag."""
+
+    rule: CompiledRule
+    message: str
+    tag: FieldTag | None
+    partners: dict[str, FieldTag]
+    conditions: tuple[Condition, ...]
+
+    @property
+    def label(self) -> str | None:
+        """What tells findings of one message apart: field, group, or nothing."""
+        report = self.rule.rule.applies.report
+        if self.tag is None or report == "message":
+            return None
+        return self.tag.field if report == "field" else (self.tag.group or self.tag.field)
+
+    def resolve(self, name: str) -> tuple[str, FieldTag | None]:
+        """Return the field that a rule calls `name`, and what it means in this view."""
+        if name == "value" and self.tag is not None:
+            return self.tag.field, self.tag
+        if name in self.partners:
+            return self.partners[name].field, self.partners[name]
+        for tag in catalogue.tags_of(self.message, name):
+            if _compatible(tag.when, self.conditions):
+                return name, tag
+        return name, None
+
+
+def bind(rule: CompiledRule, message: str) -> tuple[Binding, ...]:
+    """Return how `rule` judges `message`: one binding per matching tag, one for a message rule, or none."""
+    applies = rule.rule.applies
+    if rule.rule.detect.check:
+        return ()
+    if applies.message and not chosen(message, applies.message):
+        return ()
+    if not applies.tag:
+        conditions = tuple(_row_conditions(rule.rule, message, None))
+        return (Binding(rule, message, None, {}, conditions),) if applies.message else ()
+    return tuple(_bind_tags(rule, message))
+
+
+def _bind_tags(rule: CompiledRule, message: str) -> Iterator[Binding]:
+    wanted = rule.rule.applies.tag
+    for tag in catalogue.tags(message):
+        if not all(_criterion(getattr(tag, name), value) for name, value in wanted.items()):
+            continue
+        partners = catalogue.partners(tag)
+        if all(name in partners for name in rule.rule.applies.has):
+            conditions = (*tag.when, *_row_conditions(rule.rule, message, tag))
+            yield Binding(rule, message, tag, partners, conditions)
+
+
+def _criterion(have: object, wanted: object) -> bool:
+    if isinstance(wanted, (list, tuple)):
+        return chosen(str(have), tuple(str(w) for w in wanted))
+    return chosen(str(have), (str(wanted),))
+
+
+def chosen(value: str, choices: tuple[str, ...]) -> bool:
+    """Return whether `value` is among `choices`; those with a leading ``!`` exclude."""
+    excluded = {choice[1:] for choice in choices if choice.startswith("!")}
+    included = {choice for choice in choices if not choice.startswith("!")}
+    return value not in excluded and (not included or value in included)
+
+
+def _row_conditions(rule: Rule, message: str, tag: FieldTag | None) -> Iterator[Condition]:
+    """Return the conditions on selector fields that `applies.command` and `applies.frame` make."""
+    if rule.applies.command:
+        yield Condition(
+            "command", tuple(v for name in rule.applies.command for v in _commands(name))
+        )
+    if rule.applies.frame:
+        field = (tag.frame_field if tag is not None else "") or _frame_field(message)
+        yield Condition(field, tuple(v for name in rule.applies.frame for v in _frames(name)))
+
+
+def _commands(name: str) -> tuple[int, ...]:
+    return location_commands() if name == "location" else (constant(f"MAV_CMD.{name}"),)
+
+
+def _frames(name: str) -> tuple[int, ...]:
+    return (
+        frames_of(FrameKind(name)) if name in set(FrameKind) else (constant(f"MAV_FRAME.{name}"),)
+    )
+
+
+def _frame_field(message: str) -> str:
+    """Return the first field of a message that selects a MAV_FRAME."""
+    tags = catalogue.tags(message)
+    return next((t.field for t in tags if t.quantity is Quantity.FRAME_SELECTOR), "frame")
+
+
+def _compatible(left: tuple[Condition, ...], right: tuple[Condition, ...]) -> bool:
+    """Return whether one row can satisfy both sets of conditions."""
+    theirs = {c.field: c.values for c in right}
+    return all(not set(c.values).isdisjoint(theirs.get(c.field, c.values)) for c in left)
+
+
+class Pack(msgspec.Struct, frozen=True):
+    """Rules by ascending code, and the file that each came from."""
+
+    rules: tuple[Rule, ...]
+    sources: dict[str, str] = {}
+
+    @property
+    def by_code(self) -> dict[str, Rule]:
+        """Rules by code."""
+        return {rule.code: rule for rule in self.rules}

@@ -1,0 +1,252 @@
+"""Hits to findings: consecutive hits of one rule on one stream are one episode."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mavframecheck.engine.compiled import CompiledRule
+from mavframecheck.model import ByteLocation, Evidence, Finding, Persist, Severity, Subject
+from mavframecheck.wire import Frames
+
+MAX_EPISODES = 50
+"""Episodes per rule and stream; what comes after counts into the last one."""
+GAP_US = 10_000_000
+"""Hits further apart than this (us), with rows in between that were right, are two episodes."""
+
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+
+class Mark(NamedTuple):
+    """A frame in the recording."""
+
+    number: int
+    t_us: int | None
+    offset: int
+    size: int
+
+
+class Words(NamedTuple):
+    """What is said about the first, or worst, hit of an episode."""
+
+    severity: Severity
+    text: str
+    fix: str
+    evidence: Evidence
+    related: tuple[str, ...] = ()
+
+
+class Judged(NamedTuple):
+    """Rows that a rule looked at; arrays are (n,)."""
+
+    stream: Ints
+    """Which rows follow each other: sender, target and instance as one number."""
+    frames: Frames
+    hit: Bools
+    badness: npt.NDArray[np.float64]
+    """How bad each hit is; the worst one of an episode gives the words."""
+    subject: Callable[[int], Subject]
+    """Subject of the row at a place."""
+    describe: Callable[[int], Words]
+    """Words for the hit at a place."""
+
+
+@dataclass(slots=True)
+class Episode:
+    """Hits of one rule on one stream that belong together."""
+
+    rule: CompiledRule
+    subject: Subject
+    first: Mark
+    last: Mark
+    words: Words
+    badness: float = 0.0
+    count: int = 1
+    judged: int = 1
+    """Rows judged from the first hit to the last."""
+    since: int = 0
+    """Rows judged and found right since the last hit."""
+
+    @property
+    def lasts(self) -> bool:
+        """Whether the episode is as long and dense as its rule asks."""
+        persist: Persist = self.rule.rule.detect.persist
+        seconds = 0.0
+        if self.first.t_us is not None and self.last.t_us is not None:
+            seconds = (self.last.t_us - self.first.t_us) * 1e-6
+        return (
+            self.count >= persist.count
+            and seconds >= persist.seconds
+            and self.count >= persist.share * self.judged
+        )
+
+
+@dataclass(slots=True)
+class _Stream:
+    """The episodes of one rule on one stream, the open one last."""
+
+    episodes: list[Episode] = field(default_factory=list)
+
+
+class Episodes:
+    """Collects hits into episodes, and episodes into findings."""
+
+    def __init__(self, file: str) -> None:
+        """Collect for the recording called `file`."""
+        self._file = file
+        self._streams: dict[tuple[str, str, str | None], dict[int, _Stream]] = {}
+        self._observed: list[Episode] = []
+
+    def collect(self, rule: CompiledRule, message: str, label: str | None, judged: Judged) -> None:
+        """Add rows in frame order; rows of one stream must come in the order in which they were sent."""
+        streams = self._streams.setdefault((rule.rule.code, message, label), {})
+        hits = np.flatnonzero(judged.hit)
+        if not len(hits) and not streams:
+            return
+        for stream in (
+            np.unique(np.concatenate((judged.stream[hits], list(streams))))
+            .astype(np.int64)
+            .tolist()
+        ):
+            places = np.flatnonzero(judged.stream == stream)
+            if len(places):
+                _extend(streams.setdefault(stream, _Stream()), rule, judged, places)
+
+    def observe(self, episode: Episode) -> None:
+        """Add an episode that a Python check put together itself."""
+        self._observed.append(episode)
+
+    def findings(self) -> list[Finding]:
+        """Return the findings of all episodes that last, in order of their first frame."""
+        collected = [
+            e for group in self._streams.values() for s in group.values() for e in s.episodes
+        ]
+        lasting = [e for e in (*collected, *self._observed) if e.lasts]
+        lasting.sort(key=lambda e: (e.first.number, e.rule.rule.code, str(e.subject)))
+        return [_finding(e, self._file) for e in lasting]
+
+
+def _extend(stream: _Stream, rule: CompiledRule, judged: Judged, places: Ints) -> None:
+    """Continue the episodes of `stream` with its rows at `places`."""
+    ranks = np.flatnonzero(judged.hit[places])
+    done = 0
+    for near in _runs(judged, places, ranks):
+        full = len(stream.episodes) >= MAX_EPISODES
+        run = ranks[np.searchsorted(ranks, near[0]) :] if full else near
+        right_before = int(run[0]) - done + (stream.episodes[-1].since if stream.episodes else 0)
+        _add_run(stream, rule, judged, places[run], right_before)
+        done = int(run[-1]) + 1
+        if done > ranks[-1]:
+            break
+    if stream.episodes:
+        stream.episodes[-1].since += len(places) - done
+
+
+def _runs(judged: Judged, places: Ints, ranks: Ints) -> list[Ints]:
+    """Split hits (at `ranks` of `places`) where right rows and a long time lie in between."""
+    if not len(ranks):
+        return []
+    t_us, valid = judged.frames.t_us[places[ranks]], judged.frames.t_valid[places[ranks]]
+    apart = (np.diff(ranks) > 1) & valid[1:] & valid[:-1] & (np.abs(np.diff(t_us)) > GAP_US)
+    return np.split(ranks, np.flatnonzero(apart) + 1)
+
+
+def _add_run(
+    stream: _Stream, rule: CompiledRule, judged: Judged, hits: Ints, right_before: int
+) -> None:
+    """Add a run of hits, `right_before` of whose predecessors were right, to the episodes of a stream."""
+    first, last = _mark(judged.frames, int(hits[0])), _mark(judged.frames, int(hits[-1]))
+    worst = int(hits[np.argmax(judged.badness[hits])])
+    badness = float(judged.badness[worst])
+    length = int(np.count_nonzero(judged.stream[hits[0] : hits[-1] + 1] == judged.stream[hits[0]]))
+    current = stream.episodes[-1] if stream.episodes else None
+    full = len(stream.episodes) >= MAX_EPISODES
+    if current is not None and (full or _continues(current, first, right_before)):
+        current.judged += right_before + length
+        current.count += len(hits)
+        current.last = last
+        current.since = 0
+        if badness > current.badness:
+            current.badness, current.words = badness, judged.describe(worst)
+        return
+    if current is not None and not current.lasts:
+        stream.episodes.pop()
+    stream.episodes.append(
+        Episode(
+            rule=rule,
+            subject=judged.subject(int(hits[0])),
+            first=first,
+            last=last,
+            words=judged.describe(worst),
+            badness=badness,
+            count=len(hits),
+            judged=length,
+        )
+    )
+
+
+def _continues(episode: Episode, first: Mark, right_before: int) -> bool:
+    """Return whether a hit belongs to `episode`: no right row in between, or no long time."""
+    if right_before == 0:
+        return True
+    if episode.last.t_us is None or first.t_us is None:
+        return True
+    return abs(first.t_us - episode.last.t_us) <= GAP_US
+
+
+def _mark(frames: Frames, place: int) -> Mark:
+    t_us = int(frames.t_us[place]) if frames.t_valid[place] else None
+    return Mark(int(frames.number[place]), t_us, int(frames.offset[place]), int(frames.size[place]))
+
+
+def _finding(episode: Episode, file: str) -> Finding:
+    rule, subject, words = episode.rule.rule, episode.subject, episode.words
+    return Finding(
+        code=rule.code,
+        name=rule.name,
+        severity=words.severity,
+        confidence=rule.confidence,
+        file=file,
+        subject=str(subject),
+        sysid=subject.sysid,
+        compid=subject.compid,
+        message_name=subject.message,
+        field=subject.field,
+        time_first=_seconds(episode.first),
+        time_last=_seconds(episode.last),
+        utc_first=_utc(episode.first),
+        utc_last=_utc(episode.last),
+        count=episode.count,
+        location=ByteLocation(episode.first.offset, episode.first.size),
+        related=words.related,
+        fingerprint=fingerprint(rule.code, subject),
+        evidence=words.evidence,
+        text=words.text,
+        fix=words.fix,
+    )
+
+
+def fingerprint(code: str, subject: Subject) -> str:
+    """Return a key that is the same for the same mistake of the same stream in another recording."""
+    return hashlib.sha256(f"{code}|{subject}".encode()).hexdigest()[:16]
+
+
+def _seconds(mark: Mark) -> float | None:
+    return None if mark.t_us is None else mark.t_us * 1e-6
+
+
+def _utc(mark: Mark) -> str | None:
+    if mark.t_us is None:
+        return None
+    return (
+        datetime.fromtimestamp(mark.t_us * 1e-6, UTC)
+        .isoformat(timespec="milliseconds")
+        .replace("+00:00", "Z")
+    )

@@ -1,0 +1,114 @@
+"""The examples in rule files as recordings, so that every rule is tested on its own words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from io import BytesIO
+from typing import Any
+
+from mavframecheck.engine.check import check_recording
+from mavframecheck.engine.compiled import Pack
+from mavframecheck.engine.settings import Settings
+from mavframecheck.model import Example, FileReport, Finding, Rule, Step
+from mavframecheck.semantics.constants import constant
+from mavframecheck.sources import Recording
+from mavframecheck.wire import Dialect, load_dialect
+from mavframecheck.wire.encode import encode_frame, encode_payload, stamped
+
+START_US = 1_700_000_000_000_000
+CONTEXT_S = 0.5
+"""Context is said this long before the first step."""
+
+SENDERS = {"autopilot": (1, 1), "gcs": (255, 190), "companion": (1, 191), "camera": (1, 100)}
+
+_AUTOPILOTS = {
+    "px4": ("MAV_AUTOPILOT.PX4", "MAV_TYPE.QUADROTOR"),
+    "arducopter": ("MAV_AUTOPILOT.ARDUPILOTMEGA", "MAV_TYPE.QUADROTOR"),
+    "arduplane": ("MAV_AUTOPILOT.ARDUPILOTMEGA", "MAV_TYPE.FIXED_WING"),
+    "ardurover": ("MAV_AUTOPILOT.ARDUPILOTMEGA", "MAV_TYPE.GROUND_ROVER"),
+    "ardusub": ("MAV_AUTOPILOT.ARDUPILOTMEGA", "MAV_TYPE.SUBMARINE"),
+}
+
+
+class _Writer:
+    """Writes records with running sequence numbers."""
+
+    def __init__(self, dialect: Dialect) -> None:
+        self._dialect = dialect
+        self._seq: dict[tuple[int, int], int] = {}
+        self.data = bytearray()
+
+    def send(self, step: Step, t: float) -> None:
+        """Append the message of `step` at `t` seconds."""
+        layout = self._dialect.by_name[step.message]
+        fields = {name: number(value) for name, value in step.fields.items()}
+        if step.sender != "autopilot":
+            fields = {"target_system": 1, "target_component": 1} | fields
+        fields = {n: v for n, v in fields.items() if n in layout.by_name or n in step.fields}
+        sender = SENDERS[step.sender]
+        seq = self._seq[sender] = self._seq.get(sender, -1) + 1
+        frame = encode_frame(
+            layout,
+            encode_payload(layout, fields),
+            sysid=sender[0],
+            compid=sender[1],
+            seq=seq,
+            version=step.version,
+        )
+        if step.mangle == "checksum":
+            frame = frame[:-1] + bytes([frame[-1] ^ 0xFF])
+        copies = {"lost": 0, "twice": 2}.get(step.mangle, 1)
+        self.data += stamped(frame, START_US + round(t * 1e6)) * copies
+
+
+def number(value: Any) -> Any:
+    """Return a field value of an example; ``ENUM.NAME`` stands for its number."""
+    if (
+        isinstance(value, str)
+        and "." in value
+        and value.partition(".")[0].replace("_", "").isupper()
+    ):
+        return constant(value)
+    return value
+
+
+def recording(example: Example, dialect: Dialect) -> bytes:
+    """Return `example` as a tlog: its context, then its steps."""
+    writer = _Writer(dialect)
+    for step in _context_steps(example.context):
+        writer.send(step, 0.0)
+    for step in example.step:
+        for k in range(step.repeat):
+            writer.send(step, CONTEXT_S + step.t + k * step.every)
+    return bytes(writer.data) + bytes.fromhex(example.raw)
+
+
+def _context_steps(context: dict[str, Any]) -> Iterator[Step]:
+    """Yield the messages that say what `context` tells: autopilot, position, home."""
+    if "autopilot" in context:
+        autopilot, mav_type = _AUTOPILOTS[context["autopilot"]]
+        fields = {"autopilot": autopilot, "type": mav_type, "mavlink_version": 3}
+        yield Step(message="HEARTBEAT", sender="autopilot", fields=fields)
+    if "home" in context:
+        home = context["home"]
+        fields = {"latitude": round(home["lat"] * 1e7), "longitude": round(home["lon"] * 1e7)}
+        fields["altitude"] = round(home.get("alt_msl", 0) * 1e3)
+        yield Step(message="HOME_POSITION", sender="autopilot", fields=fields)
+    if "position" in context:
+        at = context["position"]
+        fields = {"lat": round(at["lat"] * 1e7), "lon": round(at["lon"] * 1e7)}
+        fields |= {
+            "alt": round(at.get("alt_msl", 0) * 1e3),
+            "relative_alt": round(at.get("relative_alt", 0) * 1e3),
+        }
+        yield Step(message="GLOBAL_POSITION_INT", sender="autopilot", fields=fields)
+
+
+def run_example(
+    rule: Rule, example: Example, source: str
+) -> tuple[FileReport, tuple[Finding, ...]]:
+    """Judge `example` with `rule` alone."""
+    dialect = load_dialect()
+    pack = Pack((rule,), {rule.code: source})
+    opened = Recording(rule.code, BytesIO(recording(example, dialect)), None)
+    return check_recording(opened, pack, Settings(preview=True), dialect)

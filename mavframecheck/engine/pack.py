@@ -1,0 +1,128 @@
+"""Loading rules: the shipped pack from one compiled file, a user's from TOML."""
+
+from __future__ import annotations
+
+import importlib.resources
+import tomllib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import msgspec
+
+from mavframecheck.checks import load_check
+from mavframecheck.engine.compiled import CompiledRule, Pack, RuleFileError
+from mavframecheck.engine.settings import Settings
+from mavframecheck.model import Rule
+
+COMPILED = "data/pack.json"
+
+
+def load_pack(directories: Sequence[Path] = ()) -> Pack:
+    """Return the shipped rules and those below `directories`, by code.
+
+    Raises `RuleFileError` when a file cannot be used or two rules share a code.
+    """
+    packed = importlib.resources.files(__package__).joinpath(COMPILED).read_bytes()
+    shipped = msgspec.json.decode(packed, type=Pack)
+    own = [read_rule(file) for folder in directories for file in rule_files(folder)]
+    return _pack([*((rule, shipped.sources[rule.code]) for rule in shipped.rules), *own])
+
+
+def source_folder() -> Path:
+    """Return the folder of the shipped rule files: in an installed package, else in the checkout."""
+    package = Path(__file__).parents[1]
+    installed = package / "rules"
+    return installed if installed.is_dir() else package.parent / "rules"
+
+
+def rule_files(folder: Path) -> list[Path]:
+    """Return the rule files below `folder`, sorted; RuleFileError when there is none."""
+    if not folder.is_dir():
+        message = f"{folder}: no such directory of rules"
+        raise RuleFileError(message)
+    files = sorted(folder.rglob("*.toml"))
+    if not files:
+        message = f"{folder}: no rule file (*.toml) in it"
+        raise RuleFileError(message)
+    return files
+
+
+def read_rule(file: Path) -> tuple[Rule, str]:
+    """Return the rule in `file` and the name of the file; RuleFileError names file, key and column."""
+    try:
+        content = tomllib.loads(file.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        message = f"{file}: {error}"
+        raise RuleFileError(message) from error
+    try:
+        rule = msgspec.convert(content, Rule)
+    except msgspec.ValidationError as error:
+        message = f"{file}: {error}"
+        raise RuleFileError(message) from error
+    compile_rule(rule, {}, str(file))
+    return rule, str(file)
+
+
+def compile_rule(rule: Rule, params: dict[str, float | str | bool], source: str) -> CompiledRule:
+    """Return `rule` ready to run; RuleFileError when it has no, or two, ways to detect."""
+    if bool(rule.detect.flag) == bool(rule.detect.check):
+        message = f"{source}: detect needs either flag or check"
+        raise RuleFileError(message)
+    if rule.detect.check:
+        try:
+            load_check(rule.detect.check)
+        except LookupError as error:
+            message = f"{source}: detect.check: {error}"
+            raise RuleFileError(message) from error
+    elif not (rule.applies.message or rule.applies.tag):
+        message = f"{source}: applies needs message or tag"
+        raise RuleFileError(message)
+    return CompiledRule(rule, params, source)
+
+
+def chosen_rules(pack: Pack, settings: Settings) -> list[CompiledRule]:
+    """Return the rules of `pack` that `settings` let run, compiled."""
+    return [
+        compile_rule(rule, settings.overrides.get(rule.code, {}), pack.sources[rule.code])
+        for rule in pack.rules
+        if _runs(rule, settings)
+    ]
+
+
+def _runs(rule: Rule, settings: Settings) -> bool:
+    selected = not settings.select or rule.code.startswith(settings.select)
+    if not selected or (settings.ignore and rule.code.startswith(settings.ignore)):
+        return False
+    return rule.status == "stable" or settings.preview or rule.code in settings.select
+
+
+def compiled_pack() -> bytes:
+    """Return the content that the compiled pack must have: one rule a line."""
+    folder = source_folder()
+    read = [read_rule(file) for file in rule_files(folder)]
+    pack = _pack((rule, Path(file).relative_to(folder).as_posix()) for rule, file in read)
+    rules = b",\n".join(msgspec.json.encode(rule) for rule in pack.rules)
+    return (
+        b'{"rules":[\n'
+        + rules
+        + b'\n],"sources":'
+        + msgspec.json.encode(pack.sources, order="sorted")
+        + b"}\n"
+    )
+
+
+def _pack(rules: Iterable[tuple[Rule, str]]) -> Pack:
+    sources: dict[str, str] = {}
+    by_code: dict[str, Rule] = {}
+    for rule, source in rules:
+        if rule.code in by_code:
+            message = f"{source}: {rule.code} is the code of {sources[rule.code]} already"
+            raise RuleFileError(message)
+        by_code[rule.code], sources[rule.code] = rule, source
+    return Pack(tuple(by_code[code] for code in sorted(by_code)), sources)
+
+
+if __name__ == "__main__":
+    target = Path(__file__).parent / COMPILED
+    target.parent.mkdir(exist_ok=True)
+    target.write_bytes(compiled_pack())

@@ -1,0 +1,209 @@
+"""Rows of a table as rules see them: raw and SI columns, masks, sentinels, context.
+
+Everything is computed once per table and shared by all rules that ask for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mavframecheck.geo.covariance import squared_correlation
+from mavframecheck.semantics import masks
+from mavframecheck.semantics.constants import entries, entry_name
+from mavframecheck.semantics.enums import Axis
+from mavframecheck.semantics.tags import FieldTag, Sentinel
+from mavframecheck.vehicle import Context, Known
+from mavframecheck.wire import Table
+from mavframecheck.wire.table import join as join_tables
+
+Bools = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
+
+
+class Rows:
+    """Some rows of one message, with the context that was known when they were sent."""
+
+    def __init__(self, table: Table, context: Context) -> None:
+        """See `table` in the light of `context`."""
+        self.table = table
+        self.known: dict[str, Known] = {}
+        """Context columns looked up so far; each keeps what it has once found."""
+        self.source = context
+        """Where context is looked up."""
+        self._cache: dict[tuple[object, ...], Any] = {}
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.table)
+
+    def take(self, rows: Ints | Bools) -> Rows:
+        """Return some of the rows."""
+        taken = Rows(self.table.take(rows), self.source)
+        taken.known = {
+            name: Known(column.values[rows], column.known[rows])
+            for name, column in self.known.items()
+        }
+        return taken
+
+    def compact(self) -> Rows:
+        """Return the same rows without holding on to the batch they came in."""
+        kept = Rows(self.table.compact(), self.source)
+        kept.known = self.known
+        return kept
+
+    def context(self, name: str) -> Known:
+        """Return a context column; a value once found stays."""
+        found = self.known.get(name)
+        if found is None:
+            found = self.known[name] = self.source.lookup(name, self.table)
+        return found
+
+    def refresh(self, names: Iterable[str]) -> None:
+        """Look up again what is unknown of the context columns called `names`."""
+        for name in names:
+            old = self.known.get(name)
+            if old is None or not old.known.all():
+                new = self.source.lookup(name, self.table)
+                if old is not None:
+                    new = Known(np.where(old.known, old.values, new.values), old.known | new.known)
+                self.known[name] = new
+
+    def complete(self, names: Iterable[str]) -> Bools:
+        """Return (n,) rows of which all context columns called `names` are known."""
+        complete = np.ones(len(self), np.bool_)
+        for name in names:
+            complete &= self.context(name).known
+        return complete
+
+    @property
+    def about(self) -> Ints:
+        """(n,) the system each row is about, negative where unknown."""
+        return self.cached(("about",), lambda: self.source.about(self.table))
+
+    def raw(self, field: str) -> Any:
+        """Return a column as on the wire, widened so that arithmetic on it cannot wrap."""
+        return self.cached(("raw", field), lambda: widened(self.table[field]))
+
+    def si(self, tag: FieldTag) -> Any:
+        """Return a tagged column in SI (degrees for latitude and longitude), NaN where it is unknown."""
+        key = ("si", tag.field, tag.scale, tag.sentinels)
+        return self.cached(key, lambda: self._si(tag))
+
+    def _si(self, tag: FieldTag) -> Any:
+        missing = self.unknown(tag) | ~_per_row(self.present(tag.field), self.raw(tag.field))
+        return np.where(missing, np.nan, self.raw(tag.field) * tag.scale)
+
+    def used(self, tag: FieldTag) -> Bools:
+        """Return (n,) whether the row's own mask lets the field count, and the sender gave it."""
+        present = self.present(tag.field)
+        if not tag.ignore_field:
+            return present
+        bit_set = (self.raw(tag.ignore_field) & tag.ignore_bit) != 0
+        used: Bools = present & (bit_set != tag.ignore_when_set)
+        return used
+
+    def unknown(self, tag: FieldTag) -> Bools:
+        """Return where a field holds a sentinel that says "not known"; shape of the column."""
+        return self.cached(("unknown", tag.field, tag.sentinels), lambda: self._unknown(tag))
+
+    def _unknown(self, tag: FieldTag) -> Bools:
+        raw = self.raw(tag.field)
+        result = np.zeros(raw.shape, np.bool_)
+        for sentinel in tag.sentinels:
+            if not sentinel.known:
+                result |= _matches(sentinel, raw)
+        return result
+
+    def any_unknown(self, tag: FieldTag) -> Bools:
+        """Return (n,) whether any element of a field is unknown."""
+        unknown = self.unknown(tag)
+        return unknown.any(axis=1) if unknown.ndim > 1 else unknown
+
+    def undefined(self, tag: FieldTag) -> Any:
+        """Return (n,) the bits of a mask, or the value of an enumeration, that the standard does not define."""
+        raw = self.raw(tag.field)
+        if tag.enum in masks.mask_enums():
+            return raw & ~np.int64(sum(bit.bit for bit in masks.bits(tag.enum)))
+        return np.where(np.isin(raw, list(entries(tag.enum).values())), 0, raw)
+
+    def present(self, field: str) -> Bools:
+        """Return (n,) whether the sender gave the field."""
+        return self.table.present(field)
+
+    def quaternion(self, tag: FieldTag, partners: dict[str, FieldTag]) -> Any:
+        """Return (n, 4) a quaternion, w first: the array that `tag` names, or the four fields it begins."""
+        if tag.axis is Axis.WXYZ:
+            return self.raw(tag.field)
+        following = (partners[name].field for name in ("qx", "qy", "qz"))
+        return np.stack([self.raw(field) for field in (tag.field, *following)], axis=-1)
+
+    def diagonal(self, tag: FieldTag) -> Any:
+        """Return (n, k) the variances of a covariance field."""
+        return self.raw(tag.field)[:, list(tag.diagonal)]
+
+    def correlation(self, tag: FieldTag) -> Any:
+        """Return (n,) the largest squared correlation of a covariance field (above 1: it is none)."""
+        return squared_correlation(self.raw(tag.field), tag.diagonal)
+
+    def words(self, field: str, tag: FieldTag | None) -> list[str]:
+        """Return for each row what the value of a mask, frame or enumeration field says."""
+        enum = tag.enum if tag is not None else ""
+        values = self.raw(field).tolist()
+        if enum in masks.mask_enums():
+            return ["; ".join(masks.words(enum, value)) for value in values]
+        if not enum:
+            return [str(value) for value in values]
+        return [f"{value} ({entry_name(enum, value)})" for value in values]
+
+    def cached(self, key: tuple[object, ...], compute: Any) -> Any:
+        """Return what `compute` gives, computed once for `key`."""
+        if key not in self._cache:
+            self._cache[key] = compute()
+        return self._cache[key]
+
+
+def join(parts: Sequence[Rows]) -> Rows:
+    """Return the rows of `parts`, one after the other, with the context that each has found."""
+    first = parts[0]
+    joined = Rows(join_tables([part.table for part in parts]), first.source)
+    names = set.intersection(*(set(part.known) for part in parts))
+    for name in names:
+        columns = [part.known[name] for part in parts]
+        joined.known[name] = Known(
+            np.concatenate([c.values for c in columns]), np.concatenate([c.known for c in columns])
+        )
+    return joined
+
+
+def widened(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return integers as int64 (the largest uint64 values clipped), floats as float64, texts as they are."""
+    if column.dtype.kind == "u" and column.dtype.itemsize == 8:
+        return np.minimum(column, np.uint64(2**63 - 1)).astype(np.int64)
+    if column.dtype.kind in "iu":
+        return column.astype(np.int64)
+    if column.dtype.kind == "f":
+        return column.astype(np.float64)
+    return column
+
+
+def _matches(sentinel: Sentinel, raw: npt.NDArray[Any]) -> Bools:
+    """Return where `raw` holds the sentinel; shape of `raw`."""
+    if sentinel.kind == "nan":
+        hit = np.isnan(raw)
+    elif sentinel.kind == "below":
+        hit = raw < sentinel.value
+    else:
+        hit = raw == np.float32(sentinel.value) if raw.dtype.kind == "f" else raw == sentinel.value
+    if raw.ndim == 1 or sentinel.scope == "element":
+        return np.asarray(hit)
+    whole = hit[:, 0] if sentinel.scope == "first" else hit.all(axis=1)
+    return np.broadcast_to(whole[:, None], raw.shape)
+
+
+def _per_row(rows: Bools, column: npt.NDArray[Any]) -> Bools:
+    """Return a row mask shaped to combine with `column`."""
+    return rows[:, None] if column.ndim > 1 else rows

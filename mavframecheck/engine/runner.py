@@ -1,0 +1,312 @@
+"""Runs rules over batches: tables to rows, rows to hits, hits to episodes, and how each rule ended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mavframecheck.checks import Check, Observation, load_check
+from mavframecheck.engine.compiled import Binding, CompiledRule, bind, chosen
+from mavframecheck.engine.episodes import Bools, Episode, Episodes, Judged, Mark, Words
+from mavframecheck.engine.rows import Rows
+from mavframecheck.engine.scope import RuleScope, ValueScope
+from mavframecheck.engine.template import Template, first_value, plain
+from mavframecheck.engine.waiting import Queue
+from mavframecheck.model import Evidence, Finding, RuleRun, Severity, Subject
+from mavframecheck.semantics import catalogue
+from mavframecheck.vehicle import Context
+from mavframecheck.vehicle.context import MISSING
+from mavframecheck.wire import Batch, Dialect
+
+
+@dataclass(slots=True)
+class _Tally:
+    """How much a rule could look at."""
+
+    checked: int = 0
+    late: int = 0
+    """Rows whose context never came."""
+    missing: set[str] = field(default_factory=set)
+    """Context that never came."""
+
+
+@dataclass(slots=True)
+class _Desk:
+    """The bindings on one message that need the same context, and the rows that wait for it."""
+
+    queue: Queue
+    rules: list[tuple[CompiledRule, str | None, list[Binding]]]
+
+
+class Runner:
+    """Judges one recording with some rules."""
+
+    def __init__(
+        self, file: str, rules: list[CompiledRule], context: Context, dialect: Dialect
+    ) -> None:
+        """Judge the recording called `file` with `rules`, learning `context` on the way."""
+        self._rules = [rule for rule in rules if not rule.rule.detect.check]
+        self._checks: list[tuple[CompiledRule, Check]] = [
+            (rule, load_check(rule.rule.detect.check)(rule.params, dialect))
+            for rule in rules
+            if rule.rule.detect.check
+        ]
+        self._context = context
+        self._episodes = Episodes(file)
+        self._desks: dict[str, list[_Desk]] = {}
+        self._tallies = {rule.rule.code: _Tally() for rule in self._rules}
+
+    def update(self, batch: Batch) -> None:
+        """Judge the rows of a batch, and those that waited for what it says."""
+        self._context.update(batch)
+        for message in {**dict.fromkeys(batch.tables), **dict.fromkeys(self._desks)}:
+            desks = self._desks_for(message)
+            if not desks:
+                continue
+            table = batch.tables.get(message)
+            rows = None if table is None else Rows(table, self._context)
+            for desk in desks:
+                self._serve(desk, rows, batch)
+        for _, check in self._checks:
+            check.update(batch, self._context)
+        self._context.settle()
+
+    def finish(self) -> tuple[list[Finding], list[RuleRun]]:
+        """Return all findings, and how each rule ended."""
+        for desks in self._desks.values():
+            for desk in desks:
+                self._judge_late(desk, desk.queue.close())
+        runs = [self._run_of(rule) for rule in self._rules]
+        for rule, check in self._checks:
+            runs.append(_verdict_of(rule, check))
+            for observation in check.finish():
+                self._episodes.observe(_episode(rule, observation))
+        return self._episodes.findings(), sorted(runs, key=lambda run: run.code)
+
+    def _desks_for(self, message: str) -> list[_Desk]:
+        """Bind every rule to a message that is seen for the first time."""
+        if message not in self._desks:
+            desks: dict[frozenset[str], _Desk] = {}
+            for rule in self._rules:
+                labelled: dict[str | None, list[Binding]] = {}
+                for binding in bind(rule, message):
+                    labelled.setdefault(binding.label, []).append(binding)
+                if labelled:
+                    names = rule.required | rule.wanted
+                    desk = desks.setdefault(names, _Desk(Queue(tuple(sorted(names))), []))
+                    desk.rules += [(rule, label, bindings) for label, bindings in labelled.items()]
+            self._desks[message] = list(desks.values())
+        return self._desks[message]
+
+    def _serve(self, desk: _Desk, rows: Rows | None, batch: Batch) -> None:
+        if desk.queue.names:
+            released = desk.queue.offer(rows, batch.frames)
+            self._judge_late(desk, released.late)
+            rows = released.ready
+        if rows is not None and len(rows):
+            for rule, label, bindings in desk.rules:
+                self._judge(rule, label, bindings, rows)
+
+    def _judge(
+        self, rule: CompiledRule, label: str | None, bindings: list[Binding], rows: Rows
+    ) -> None:
+        """Let one rule look at rows; several bindings with one label (views of one field) act as one."""
+        looked = np.zeros(len(rows), np.bool_)
+        hit = np.zeros(len(rows), np.bool_)
+        badness = np.zeros(len(rows))
+        by = np.zeros(len(rows), np.int64)
+        for k, binding in enumerate(bindings):
+            seen = _applies(rule, binding, rows)
+            if not seen.any():
+                continue
+            scope = RuleScope(rows, binding)
+            if rule.when is not None:
+                seen &= rule.when(scope)
+            found = seen & _any_element(rule.flag(scope)) & ~hit
+            looked |= seen
+            hit |= found
+            by[found] = k
+            if rule.worst is not None and found.any():
+                badness[found] = np.nan_to_num(
+                    np.abs(np.broadcast_to(rule.worst(scope), len(rows))[found])
+                )
+        self._tallies[rule.rule.code].checked += int(looked.sum())
+        if looked.any():
+            self._collect(rule, label, bindings, rows, looked, hit, badness, by)
+
+    def _collect(
+        self,
+        rule: CompiledRule,
+        label: str | None,
+        bindings: list[Binding],
+        rows: Rows,
+        looked: Bools,
+        hit: Bools,
+        badness: np.typing.NDArray[np.float64],
+        by: np.typing.NDArray[np.int64],
+    ) -> None:
+        places = np.flatnonzero(looked)
+        frames = rows.table.frames
+        shown = label if rule.rule.applies.report == "field" else None
+
+        def describe(place: int) -> Words:
+            row = places[place : place + 1]
+            return _words(rule, RuleScope(rows.take(row), bindings[by[row[0]]]))
+
+        def subject(place: int) -> Subject:
+            row = places[place]
+            return Subject(int(frames.sysid[row]), int(frames.compid[row]), rows.table.name, shown)
+
+        judged = Judged(
+            _streams(rows)[places],
+            frames.take(places),
+            hit[places],
+            badness[places],
+            subject,
+            describe,
+        )
+        self._episodes.collect(rule, rows.table.name, label, judged)
+
+    def _judge_late(self, desk: _Desk, rows: Rows | None) -> None:
+        """Judge rows whose context never came where a rule can do without it; count the others."""
+        if rows is None or not len(rows):
+            return
+        for rule, label, bindings in desk.rules:
+            decidable = rows.complete(rule.required)
+            if decidable.any():
+                self._judge(rule, label, bindings, rows.take(decidable))
+            stuck = rows.take(~decidable)
+            concerned = np.zeros(len(stuck), np.bool_)
+            for binding in bindings:
+                concerned |= _concerns(rule, binding, stuck)
+            if concerned.any():
+                tally = self._tallies[rule.rule.code]
+                tally.late += int(concerned.sum())
+                tally.missing |= {
+                    n for n in rule.required if not stuck.context(n).known[concerned].all()
+                }
+
+    def _run_of(self, rule: CompiledRule) -> RuleRun:
+        code, tally = rule.rule.code, self._tallies[rule.rule.code]
+        why = "; ".join(sorted({MISSING[name] for name in tally.missing}))
+        if tally.checked:
+            reason = f"{tally.late} rows not judged: {why}" if tally.late else ""
+            return RuleRun(code=code, status="ran", checked=tally.checked, reason=reason)
+        if tally.late:
+            return RuleRun(code=code, status="insufficient-data", reason=why)
+        return RuleRun(code=code, status="not-applicable", reason=_what_was_missing(rule))
+
+
+def _any_element(column: Any) -> Any:
+    """Return (n,) whether any element of a row holds; a scalar stays one."""
+    array = np.asarray(column)
+    return array.any(axis=1) if array.ndim > 1 else array
+
+
+def _concerns(rule: CompiledRule, binding: Binding, rows: Rows) -> Bools:
+    """Return (n,) rows that a binding is about, as far as the message itself tells."""
+    concerned = np.ones(len(rows), np.bool_)
+    for condition in binding.conditions:
+        concerned &= np.isin(rows.raw(condition.field), condition.values)
+    if rule.rule.applies.sender:
+        concerned &= _among(rows, "sender.role", rule.rule.applies.sender)
+    return concerned
+
+
+def _applies(rule: CompiledRule, binding: Binding, rows: Rows) -> Bools:
+    """Return (n,) rows that a binding judges."""
+    concerned = _concerns(rule, binding, rows)
+    if rule.rule.applies.autopilot:
+        concerned &= _among(rows, "vehicle.autopilot", rule.rule.applies.autopilot)
+    return concerned
+
+
+def _among(rows: Rows, name: str, choices: tuple[str, ...]) -> Bools:
+    """Return (n,) rows whose context text is among `choices`."""
+
+    def compute() -> Bools:
+        values = rows.context(name).values
+        kinds, which = np.unique(values, return_inverse=True)
+        return np.array([chosen(kind, choices) for kind in kinds.tolist()], np.bool_)[which]
+
+    found: Bools = rows.cached(("among", name, choices), compute)
+    return found
+
+
+def _streams(rows: Rows) -> np.typing.NDArray[np.int64]:
+    """Return (n,) sender, target and instance as one number: rows of one number follow each other."""
+    table = rows.table
+    stream = table.frames.sender
+    if "target_system" in table.layout.by_name:
+        stream = stream * 256 + table["target_system"]
+    instance = next((t.instance_field for t in catalogue.tags(table.name) if t.instance_field), "")
+    if instance in table.layout.by_name and table[instance].dtype.kind in "iu":
+        stream = stream * 2**16 + (rows.raw(instance) & 0xFFFF)
+    return np.asarray(stream, np.int64)
+
+
+def _words(rule: CompiledRule, scope: RuleScope | ValueScope) -> Words:
+    """Return severity, text, fix and evidence for the first row of `scope`."""
+    severity = rule.rule.severity
+    for condition, other in rule.severities:
+        if bool(first_value(condition(scope))):
+            severity = Severity(other)
+            break
+    return Words(
+        severity, rule.text.fill(scope), rule.fix.fill(scope), dict(_evidence(rule.evidence, scope))
+    )
+
+
+def _evidence(
+    templates: dict[str, Template], scope: RuleScope | ValueScope
+) -> Iterator[tuple[str, object]]:
+    for key in ("expected", "observed", "unit", "frame"):
+        yield key, None
+    for key, template in templates.items():
+        yield key, template.value(scope)
+
+
+def _episode(rule: CompiledRule, observation: Observation) -> Episode:
+    """Return an observation of a Python check as an episode."""
+    values = {
+        name: plain(value) if value is not None else None
+        for name, value in observation.values.items()
+    }
+    words = _words(rule, ValueScope(observation.values, rule.params))
+    evidence: Evidence = {**values, **words.evidence}
+    return Episode(
+        rule=rule,
+        subject=observation.subject,
+        first=Mark(*observation.first),
+        last=Mark(*observation.last),
+        words=words._replace(evidence=evidence),
+        count=observation.count,
+        judged=observation.count,
+    )
+
+
+def _verdict_of(rule: CompiledRule, check: Check) -> RuleRun:
+    verdict = check.verdict()
+    if verdict.insufficient:
+        status, reason = "insufficient-data", verdict.insufficient
+    elif verdict.checked:
+        status, reason = "ran", ""
+    else:
+        status, reason = "not-applicable", _what_was_missing(rule)
+    return RuleRun(code=rule.rule.code, status=status, reason=reason, checked=verdict.checked)
+
+
+def _what_was_missing(rule: CompiledRule) -> str:
+    """Say in words what would have had to be in the recording."""
+    applies = rule.rule.applies
+    if applies.message:
+        what = f"no {' or '.join(applies.message)}"
+    elif applies.tag:
+        what = "no field with " + ", ".join(f"{key} {value}" for key, value in applies.tag.items())
+    else:
+        what = "nothing in the recording"
+    conditions = (*applies.sender, *applies.autopilot, *applies.command, *applies.frame)
+    return f"{what} that the rule is about" + (f" ({', '.join(conditions)})" if conditions else "")

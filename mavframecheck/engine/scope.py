@@ -1,0 +1,104 @@
+"""What the expressions of a rule are evaluated on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from mavframecheck.engine.compiled import Binding, RuleFileError
+from mavframecheck.engine.rows import Rows
+from mavframecheck.semantics.tags import FieldTag
+
+
+class RuleScope:
+    """Rows of one message, seen through one binding of a rule."""
+
+    def __init__(self, rows: Rows, binding: Binding) -> None:
+        """See `rows` through `binding`."""
+        self.rows = rows
+        self.binding = binding
+        self._names: dict[str, Any] = {}
+
+    def field(self, function: str, name: str) -> Any:
+        """Return ``function(name)`` as a column; RuleFileError when the message has no such field."""
+        field, tag = self.binding.resolve(name)
+        if field not in self.rows.table.layout.by_name:
+            self._refuse(f"{self.binding.message} has no field called {name!r}")
+        plain = _OF_FIELD.get(function)
+        if plain is not None:
+            return plain(self.rows, field)
+        if function == "words":
+            return self.rows.words(field, tag)
+        if tag is None:
+            self._refuse(
+                f"{function}({name}): the catalogue has no meaning for {self.binding.message}.{field}"
+            )
+        if function == "quaternion":
+            return self.rows.quaternion(tag, self.binding.partners)
+        return _OF_TAG[function](self.rows, tag)
+
+    def name(self, name: str) -> Any:
+        """Return a parameter, a named expression, or (in texts) the message or field."""
+        rule = self.binding.rule
+        if name in rule.params:
+            return rule.params[name]
+        if name in rule.lets:
+            if name not in self._names:
+                self._names[name] = rule.lets[name](self)
+            return self._names[name]
+        tag = self.binding.tag
+        return self.binding.message if name == "message" else (tag.field if tag is not None else "")
+
+    def context(self, name: str) -> Any:
+        """Return the values of a context column."""
+        return self.rows.context(name).values
+
+    def _refuse(self, problem: str) -> Any:
+        message = f"rule {self.binding.rule.rule.code}: {problem}"
+        raise RuleFileError(message)
+
+
+class ValueScope:
+    """What the texts of a rule with a Python check are filled in from: named values."""
+
+    def __init__(self, values: Mapping[str, Any], params: Mapping[str, Any]) -> None:
+        """Know `values` and the parameters of the rule."""
+        self._values = {**params, **values}
+
+    def field(self, function: str, name: str) -> Any:
+        """Fields are unknown here."""
+        raise RuleFileError(f"{function}({name}) cannot be used in the texts of a Python check")
+
+    def name(self, name: str) -> Any:
+        """Return the value called `name`."""
+        if name not in self._values:
+            message = f"the check gives no value called {name!r}: it gives {', '.join(sorted(self._values))}"
+            raise RuleFileError(message)
+        return self._values[name]
+
+    def context(self, name: str) -> Any:
+        """Context is unknown here."""
+        raise RuleFileError(f"{name} cannot be used in the texts of a Python check")
+
+
+def _used(rows: Rows, tag: FieldTag) -> Any:
+    return rows.used(tag)
+
+
+def _ignored(rows: Rows, tag: FieldTag) -> Any:
+    return np.logical_not(rows.used(tag))
+
+
+_OF_FIELD: dict[str, Callable[[Rows, str], Any]] = {"raw": Rows.raw, "present": Rows.present}
+_OF_TAG: dict[str, Callable[[Rows, FieldTag], Any]] = {
+    "si": Rows.si,
+    "used": _used,
+    "ignored": _ignored,
+    "unknown": Rows.unknown,
+    "any_unknown": Rows.any_unknown,
+    "undefined": Rows.undefined,
+    "diagonal": Rows.diagonal,
+    "correlation": Rows.correlation,
+}

@@ -1,0 +1,64 @@
+"""Rows that wait for context: home, identity and version often come after the row they judge."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mavframecheck.engine.rows import Rows, join
+from mavframecheck.vehicle.history import LATE_FRAMES, LATE_US
+from mavframecheck.wire import Frames
+
+
+class Released(NamedTuple):
+    """Rows that leave the queue: `ready` to be judged, or `late` for context that did not come."""
+
+    ready: Rows | None
+    late: Rows | None
+
+
+class Queue:
+    """The rows of one message that wait for one set of context names."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        """Wait for the context columns called `names`."""
+        self.names = names
+        self._waiting: Rows | None = None
+
+    def offer(self, rows: Rows | None, now: Frames) -> Released:
+        """Add `rows`; return all that have their context, and those that waited too long.
+
+        `now` are the frames of the current batch: their end is the present.
+        """
+        parts = [part for part in (self._waiting, rows) if part is not None and len(part)]
+        self._waiting = None
+        if not parts:
+            return Released(None, None)
+        both = parts[0] if len(parts) == 1 else join(parts)
+        both.refresh(self.names)
+        complete = both.complete(self.names)
+        if complete.all():
+            return Released(both, None)
+        late = ~complete & _too_old(both, now)
+        keep = ~complete & ~late
+        if keep.any():
+            self._waiting = both.take(keep).compact()
+        return Released(both.take(complete), both.take(late) if late.any() else None)
+
+    def close(self) -> Rows | None:
+        """Return what still waits when the recording ends."""
+        waiting, self._waiting = self._waiting, None
+        return waiting
+
+
+def _too_old(rows: Rows, now: Frames) -> np.typing.NDArray[np.bool_]:
+    """Return (n,) rows for which a value said after `now` would come too late."""
+    if not len(now):
+        return np.zeros(len(rows), np.bool_)
+    frames = rows.table.frames
+    old = now.number[-1] - frames.number > LATE_FRAMES
+    timed = np.flatnonzero(now.t_valid)
+    if len(timed):
+        old |= frames.t_valid & (now.t_us[timed[-1]] - frames.t_us > LATE_US)
+    return np.asarray(old)

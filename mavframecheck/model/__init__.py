@@ -1,0 +1,53 @@
+"""Plain structs that every floor shares: Rule, Finding, RuleRun, Report."""
+
+from mavframecheck.model.finding import (
+    ByteLocation,
+    Damage,
+    Evidence,
+    FileReport,
+    Finding,
+    MissionLocation,
+    Report,
+    RuleRun,
+    Scalar,
+    Subject,
+    Vehicle,
+)
+from mavframecheck.model.rule import (
+    Applies,
+    Confidence,
+    Detect,
+    Example,
+    Explain,
+    Persist,
+    Rule,
+    Severity,
+    SeverityWhen,
+    Status,
+    Step,
+)
+
+__all__ = [
+    "Applies",
+    "ByteLocation",
+    "Confidence",
+    "Damage",
+    "Detect",
+    "Evidence",
+    "Example",
+    "Explain",
+    "FileReport",
+    "Finding",
+    "MissionLocation",
+    "Persist",
+    "Report",
+    "Rule",
+    "RuleRun",
+    "Scalar",
+    "Severity",
+    "SeverityWhen",
+    "Status",
+    "Step",
+    "Subject",
+    "Vehicle",
+]

@@ -1,0 +1,307 @@
+"""`--format text`: for people, at 80 columns or piped.
+
+A file is a head (what was read, who spoke), its findings by stream with the worst first, and the
+verdict: what was found and how much was judged. Silence must not read as a pass.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain, groupby
+
+from mavframecheck.model import (
+    ByteLocation,
+    FileReport,
+    Finding,
+    MissionLocation,
+    RuleRun,
+    Severity,
+    Subject,
+)
+from mavframecheck.report import Checked, Context
+from mavframecheck.report.escape import sentence
+from mavframecheck.report.layout import SEVERITY_COLOURS, Page
+from mavframecheck.report.words import (
+    autopilot,
+    component,
+    duration,
+    elapsed,
+    is_number,
+    plural,
+    scalar,
+    shortened,
+    utc,
+)
+
+_MOST_COMPONENTS = 12
+"""Components listed in the head of a file: a hostile log has hundreds."""
+_MOST_AUTOPILOTS = 4
+_WIDEST_LABEL = 16
+_VERDICTS = ("ran", "insufficient-data", "not-applicable")
+"""A rule that ends differently on different streams counts as the first of these."""
+
+
+def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
+    """Yield each file as it is judged, then, when there were several, all of them in a line."""
+    page = Page(context)
+    files: list[FileReport] = []
+    severities: Counter[Severity] = Counter()
+    for file, findings in results:
+        gap = [""] if files else []
+        files.append(file)
+        severities.update(finding.severity for finding in findings)
+        yield from _lines(chain(gap, _file(file, findings, page)))
+    if len(files) > 1:
+        total = f"{len(files)} files: {_found(severities)}"
+        yield from _lines(chain(("", page.bold(total)), _judged(files, page)))
+    if not files:
+        yield "nothing was judged\n"
+
+
+def _lines(lines: Iterable[str]) -> Iterator[str]:
+    """Yield one piece of output: a file appears whole, and a pipe is written to once."""
+    yield "".join(f"{line}\n" for line in lines)
+
+
+def _file(file: FileReport, findings: Sequence[Finding], page: Page) -> Iterator[str]:
+    yield from _head(file, page)
+    yield from _findings(file, findings, page)
+    if page.context.verbose:
+        yield from _damage(file, page)
+        yield from _not_judged(file, page)
+    yield ""
+    found = _found(Counter(finding.severity for finding in findings))
+    yield page.bold(found) + page.dim(_hint(findings))
+    yield from _judged([file], page)
+
+
+# ---- head of a file ----
+
+
+def _head(file: FileReport, page: Page) -> Iterator[str]:
+    yield page.bold(sentence(file.path))
+    yield from page.wrap(_read(file), "  ", "    ")
+    speakers = file.vehicles if page.context.verbose else file.vehicles[:_MOST_COMPONENTS]
+    ids = [f"{vehicle.sysid}/{vehicle.compid}" for vehicle in speakers]
+    column = max((len(text) for text in ids), default=0) + 2
+    for text, vehicle in zip(ids, speakers):
+        yield from page.wrap(component(vehicle), f"  {text:{column}}", " " * (column + 2))
+    if len(file.vehicles) > len(speakers):
+        yield f"  and {plural(len(file.vehicles) - len(speakers), 'more sender')} (--verbose)"
+    for note in file.notes:
+        yield from page.wrap(f"note: {note}", "  ", "    ")
+
+
+def _read(file: FileReport) -> str:
+    """Return what the file is, how long, how much."""
+    frames = plural(file.messages, "frame") if file.messages else "nothing could be decoded"
+    start = f" from {utc(file.time_start)}" if file.time_start is not None else ""
+    length = [duration(file.duration_s) + start] if file.duration_s is not None else []
+    unknown = [f"{plural(file.unknown, 'frame')} of unknown messages"] if file.unknown else []
+    return ", ".join([file.kind, *length, frames, *unknown])
+
+
+# ---- findings ----
+
+
+def _findings(file: FileReport, findings: Sequence[Finding], page: Page) -> Iterator[str]:
+    """Yield the findings stream by stream; the stream with the worst finding comes first."""
+    streams = {stream: list(group) for stream, group in groupby(_sorted(findings), key=_stream)}
+    for stream, group in sorted(streams.items(), key=lambda item: _rank(item[1][0])):
+        yield ""
+        yield page.bold(sentence(str(stream)) or "the file as a whole")
+        for number, finding in enumerate(group):
+            if number:
+                yield ""
+            yield from _finding(finding, file, page)
+
+
+def _sorted(findings: Sequence[Finding]) -> list[Finding]:
+    """Return the findings by stream, within it the worst first, then in order of time."""
+
+    def key(finding: Finding) -> tuple[int, int, str, int, bool, float]:
+        stream = _number(finding.sysid), _number(finding.compid), finding.message_name or ""
+        return *stream, _rank(finding), finding.time_first is None, finding.time_first or 0.0
+
+    return sorted(findings, key=key)
+
+
+def _number(component: int | None) -> int:
+    """Return an id that sorts: what has none comes first."""
+    return -1 if component is None else component
+
+
+def _rank(finding: Finding) -> int:
+    return -finding.severity.rank
+
+
+def _stream(finding: Finding) -> Subject:
+    return Subject(finding.sysid, finding.compid, finding.message_name)
+
+
+def _finding(finding: Finding, file: FileReport, page: Page) -> Iterator[str]:
+    yield from _title(finding, page)
+    yield from page.wrap(_when(finding, file), "    ", style="dim")
+    yield from page.wrap(finding.text, "    ")
+    rows = _evidence(finding)
+    column = min(max(len(label) for label, _ in rows), _WIDEST_LABEL) + 2
+    for label, value in rows:
+        yield from page.labelled(label, value, column)
+
+
+def _title(finding: Finding, page: Page) -> Iterator[str]:
+    """Yield ``error MFC302 degrees-in-scaled-field, lat_int``, coloured after it is wrapped."""
+    sure = "" if finding.confidence == "high" else f" ({finding.confidence} confidence)"
+    field = f", {finding.field}" if finding.field else ""
+    first, *rest = page.wrap(f"{finding.severity} {finding.code} {finding.name}{field}{sure}", "  ")
+    plain = f"{finding.severity} {sentence(finding.code)}"
+    yield first.replace(plain, page.paint(plain, SEVERITY_COLOURS[finding.severity]), 1)
+    yield from rest
+
+
+def _when(finding: Finding, file: FileReport) -> str:
+    """Return how often, time since the start of the recording and UTC, and where in the file."""
+    often = f"{finding.count} times" if finding.count > 1 else "once"
+    times = [t for t in (finding.time_first, finding.time_last) if t is not None]
+    since = _span([elapsed(t - (file.time_start or t)) for t in times], "at ", "from ")
+    clock = _clock(finding.utc_first, finding.utc_last)
+    when = " ".join(filter(None, (often, since, f"({clock} UTC)" if clock else "")))
+    return ", ".join(filter(None, (when, _where(finding))))
+
+
+def _span(ends: list[str], one: str = "", two: str = "") -> str:
+    """Return ``a to b`` after the word `two`, or ``a`` after `one` when both are the same."""
+    distinct = list(dict.fromkeys(ends))
+    word = two if len(distinct) > 1 else one
+    return word + " to ".join(distinct) if distinct else ""
+
+
+def _clock(first: str | None, last: str | None) -> str:
+    """Return two UTC times to the second, their common day written once."""
+    ends = [
+        text.replace("T", " ").removesuffix("Z").split(".")[0] for text in (first, last) if text
+    ]
+    if len(ends) == 2 and ends[0] != ends[1] and ends[0][:11] == ends[1][:11]:
+        ends[1] = ends[1][11:]
+    return _span(ends)
+
+
+def _where(finding: Finding) -> str:
+    """Return the byte of the first hit, or line and item of a mission."""
+    match finding.location:
+        case ByteLocation(offset=offset):
+            return f"first at byte {offset}" if finding.count > 1 else f"byte {offset}"
+        case MissionLocation(line=line, item=item, command=command):
+            parts = (
+                f"line {line}" if line is not None else "",
+                f"item {item}" if item is not None else "",
+                command or "",
+            )
+            return ", ".join(filter(None, parts))
+    return ""
+
+
+def _evidence(finding: Finding) -> list[tuple[str, str]]:
+    """Return labels and values: expected and observed with their unit, the rest, the remedy."""
+    evidence = {key: scalar(value) for key, value in finding.evidence.items() if value is not None}
+    unit = evidence.pop("unit", "")
+    rows: list[tuple[str, str]] = []
+    for key in ("expected", "observed"):
+        if key in evidence:
+            value = evidence.pop(key)
+            rows.append((key, f"{value} {unit}".rstrip() if is_number(value) else value))
+    if unit and not any(value.endswith(f" {unit}") for _, value in rows):
+        rows.append(("unit", unit))
+    rows += [(sentence(key), value) for key, value in evidence.items()]
+    if finding.related:
+        rows.append(("against", ", ".join(finding.related)))
+    return [*rows, ("fix", finding.fix)]
+
+
+# ---- verdict ----
+
+
+def _found(severities: Counter[Severity]) -> str:
+    """Return ``2 errors, 1 warning``, or that there is nothing."""
+    counts = [
+        f"{severities[severity]} info"
+        if severity is Severity.INFO
+        else plural(severities[severity], severity)
+        for severity in Severity
+        if severities[severity]
+    ]
+    return ", ".join(counts) or "no findings"
+
+
+def _hint(findings: Sequence[Finding]) -> str:
+    """Return how to learn more of the worst finding."""
+    if not findings:
+        return ""
+    return f" (mavframecheck rule {sentence(min(findings, key=_rank).code)} explains)"
+
+
+def _judged(files: Sequence[FileReport], page: Page) -> Iterator[str]:
+    """Yield the last line: how much was judged, and by what idea of the vehicle."""
+    ends = Counter(_verdicts(chain.from_iterable(file.runs for file in files)).values())
+    idle = ends["not-applicable"] + ends["insufficient-data"]
+    checksums = sum(file.bad_crc for file in files)
+    parts = [
+        f"{plural(ends['ran'], 'rule')} ran",
+        f"{ends['not-applicable']} not applicable",
+        f"{ends['insufficient-data']} insufficient"
+        + (" (see --verbose)" if idle and not page.context.verbose else ""),
+        plural(sum(file.messages for file in files), "frame"),
+        *([plural(checksums, "bad checksum")] if checksums else []),
+        f"{plural(sum(file.skipped_bytes for file in files), 'byte')} skipped",
+        _vehicles(files),
+    ]
+    line = ", ".join(parts)
+    yield from page.wrap(line) if page.context.terminal else (line,)
+
+
+def _verdicts(runs: Iterable[RuleRun]) -> dict[str, str]:
+    """Return code to how the rule ended where it came furthest."""
+    best: dict[str, str] = {}
+    for run in runs:
+        best[run.code] = min(best.get(run.code, run.status), run.status, key=_VERDICTS.index)
+    return best
+
+
+def _vehicles(files: Sequence[FileReport]) -> str:
+    speakers = [vehicle for file in files for vehicle in file.vehicles]
+    known = sorted({autopilot(each) for each in speakers if each.role == "autopilot"})
+    if known:
+        return shortened(known, _MOST_AUTOPILOTS)
+    if speakers and all(each.role == "gcs" for each in speakers):
+        return "no vehicle in this log" if len(files) == 1 else "no vehicle in these logs"
+    return "unknown autopilot"
+
+
+# ---- what --verbose adds ----
+
+
+def _damage(file: FileReport, page: Page) -> Iterator[str]:
+    if not file.damage:
+        return
+    yield ""
+    yield page.bold("damage")
+    for each in file.damage:
+        place = f"bytes {each.offset} to {each.offset + each.length - 1} ({each.length})"
+        yield from page.wrap(f"{place}: {each.reason}", "  ", "    ")
+    if file.damage_total > len(file.damage):
+        yield f"  and {plural(file.damage_total - len(file.damage), 'more range')}"
+
+
+def _not_judged(file: FileReport, page: Page) -> Iterator[str]:
+    """Yield what was not looked at, in whole or (a rule that ran, with a reason) in part."""
+    idle = [run for run in file.runs if run.status != "ran" or run.reason]
+    if not idle:
+        return
+    yield ""
+    yield page.bold("not judged")
+    for run in idle:
+        subject = f" for {run.subject}" if run.subject else ""
+        status = run.status.replace("-", " ")
+        reason = f": {run.reason}" if run.reason else ""
+        yield from page.wrap(f"{run.code} {status}{subject}{reason}", "  ", "    ")

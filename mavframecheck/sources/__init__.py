@@ -1,0 +1,20 @@
+"""Where bytes come from: files, captures, directories and standard input, as chunks for framing."""
+
+from mavframecheck.sources.paths import STDIN, Inputs, Stdin, expand
+from mavframecheck.sources.recording import Recording, open_recording
+from mavframecheck.sources.sniff import MISSIONS, RECORDINGS, Kind, sniff
+from mavframecheck.sources.stream import SourceError
+
+__all__ = [
+    "MISSIONS",
+    "RECORDINGS",
+    "STDIN",
+    "Inputs",
+    "Kind",
+    "Recording",
+    "SourceError",
+    "Stdin",
+    "expand",
+    "open_recording",
+    "sniff",
+]

@@ -1,0 +1,31 @@
+"""Bytes to frames to columns."""
+
+from mavframecheck.wire.batch import Batch, read_batches
+from mavframecheck.wire.chunk import Chunk, whole
+from mavframecheck.wire.dialect import (
+    DEFAULT_DIALECT,
+    Dialect,
+    DialectError,
+    Field,
+    Layout,
+    load_dialect,
+)
+from mavframecheck.wire.frames import Frames
+from mavframecheck.wire.table import Column, Table, Tables
+
+__all__ = [
+    "DEFAULT_DIALECT",
+    "Batch",
+    "Chunk",
+    "Column",
+    "Dialect",
+    "DialectError",
+    "Field",
+    "Frames",
+    "Layout",
+    "Table",
+    "Tables",
+    "load_dialect",
+    "read_batches",
+    "whole",
+]

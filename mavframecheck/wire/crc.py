@@ -1,0 +1,103 @@
+"""CRC-16/MCRF4XX (the checksum of MAVLink) over many frames at once.
+
+The checksum is linear: that of a frame is the XOR of what each byte contributes by its distance from the
+end, and of what the start value 0xFFFF contributes by the length. Frames sorted by length are therefore
+checked together, one table look-up per two bytes and no loop over frames.
+Source: MAVLink developer guide, "Packet Serialization"; CRC catalogue entry CRC-16/MCRF4XX.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import numpy.typing as npt
+
+START = 0xFFFF
+WORD = 8
+"""Bytes looked up from the buffer at once."""
+LONGEST = 9 + 255 + 1 + WORD
+"""Bytes that a checksum covers at most (header without magic, payload, seed), and a word of room."""
+_TAIL_MASKS = np.array([(2**64 - 1) << 8 * n & (2**64 - 1) for n in range(WORD + 1)], np.uint64)
+"""Keep all but the first n bytes of a little-endian word."""
+
+
+@functools.cache
+def _byte_table() -> npt.NDArray[np.uint16]:
+    """(256,) what a byte in the low half of the register turns into after eight shifts."""
+    table = np.arange(256, dtype=np.uint16)
+    for _ in range(8):
+        table = np.where(table & 1, (table >> 1) ^ 0x8408, table >> 1).astype(np.uint16)
+    return table
+
+
+@functools.cache
+def _distance_tables() -> npt.NDArray[np.uint16]:
+    """(LONGEST, 256) contribution of a byte value followed by k further bytes."""
+    step = _byte_table()
+    tables = np.empty((LONGEST, 256), np.uint16)
+    tables[0] = step
+    for k in range(1, LONGEST):
+        tables[k] = step[tables[k - 1] & 0xFF] ^ (tables[k - 1] >> 8)
+    return tables
+
+
+@functools.cache
+def _pair_table(distance: int) -> npt.NDArray[np.uint16]:
+    """(65536,) contribution of two bytes, the second of which is followed by `distance` further bytes."""
+    tables = _distance_tables()
+    return np.bitwise_xor.outer(tables[distance], tables[distance + 1]).reshape(-1)
+
+
+@functools.cache
+def _start_values() -> npt.NDArray[np.uint16]:
+    """(LONGEST + 1,) contribution of the start value to a checksum over n bytes."""
+    step = _byte_table()
+    values = np.empty(LONGEST + 1, np.uint16)
+    values[0] = START
+    for n in range(1, LONGEST + 1):
+        values[n] = step[values[n - 1] & 0xFF] ^ (values[n - 1] >> 8)
+    return values
+
+
+def crc16(data: bytes) -> int:
+    """Return the checksum of one byte string of any length."""
+    step = _byte_table()
+    crc = START
+    for byte in data:
+        crc = int(step[(crc ^ byte) & 0xFF]) ^ (crc >> 8)
+    return crc
+
+
+def crc16_of_ranges(
+    buffer: npt.NDArray[np.uint8],
+    starts: npt.NDArray[np.int64],
+    lengths: npt.NDArray[np.int64],
+    seeds: npt.NDArray[np.uint8],
+) -> npt.NDArray[np.uint16]:
+    """Return the checksum of each ``buffer[start : start + length]`` followed by its seed byte.
+
+    `starts`, `lengths` and `seeds` are (n,); ranges are at most 264 long. Result (n,).
+    """
+    tables = _distance_tables()
+    order = np.argsort((LONGEST - lengths).astype(np.uint16), kind="stable")
+    left = lengths[order]
+    crc = _start_values()[left + 1] ^ tables[0][seeds[order]]
+    words = np.ndarray(len(buffer) - WORD + 1, "<u8", buffer, strides=(1,))
+    at = starts[order] + left
+    distance = 1
+    while len(left) and left[0] > 0:
+        active = int(np.searchsorted(-left, 0, side="left"))
+        left, at = left[:active] - WORD, at[:active] - WORD
+        word = words[np.maximum(at, 0)]
+        early = np.flatnonzero(at < 0)
+        word[early] <<= (8 * -at[early]).astype(np.uint64)
+        short = int(np.searchsorted(-left, 0, side="right"))
+        word[short:] &= _TAIL_MASKS[-left[short:]]
+        pairs = word.view("<u2").reshape(-1, WORD // 2)
+        for k in range(WORD // 2):
+            crc[:active] ^= _pair_table(distance + WORD - 2 - 2 * k).take(pairs[:, k])
+        distance += WORD
+    result = np.empty_like(crc)
+    result[order] = crc
+    return result

@@ -1,0 +1,75 @@
+"""Frames: what the headers of a batch say, as a struct of arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+STX_V1, STX_V2 = 0xFE, 0xFD
+HEADER_V1, HEADER_V2 = 6, 10
+CHECKSUM, SIGNATURE, STAMP = 2, 13, 8
+SIGNED_FLAG = 0x01
+LONGEST_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
+
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(slots=True)
+class Frames:
+    """The frames of a batch in the order in which they were received; every array is (n,)."""
+
+    start: Ints
+    """Index of the magic byte in the buffer of the batch."""
+    payload: Ints
+    """Index of the first payload byte there."""
+    offset: Ints
+    """Offset of the magic byte in the recording, bytes."""
+    t_us: Ints
+    """Receive time as recorded, us since 1970; 0 where the recording has none."""
+    t_valid: Bools
+    """Whether `t_us` may enter a duration, rate, gap or fit."""
+    sysid: npt.NDArray[np.uint8]
+    compid: npt.NDArray[np.uint8]
+    seq: npt.NDArray[np.uint8]
+    msgid: npt.NDArray[np.int32]
+    length: npt.NDArray[np.uint8]
+    """Payload bytes received."""
+    size: Ints
+    """Bytes of the whole frame."""
+    version: npt.NDArray[np.uint8]
+    """1 or 2."""
+    signed: Bools
+    known: Bools
+    """Whether the dialect has the message id."""
+    crc_ok: Bools
+    """Whether the checksum holds; False for unknown ids, which cannot be checked."""
+    checksum: npt.NDArray[np.uint16]
+    """As received."""
+    number: Ints
+    """Running number of the frame in the whole stream: the order that context is joined by."""
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.start)
+
+    def take(self, rows: Ints | Bools) -> Frames:
+        """Return the frames at `rows`."""
+        return Frames(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+    @property
+    def sender(self) -> Ints:
+        """(n,) system and component as one number: ``sysid * 256 + compid``."""
+        return self.sysid.astype(np.int64) * 256 + self.compid
+
+    @property
+    def good(self) -> Bools:
+        """(n,) frames whose payload can be believed."""
+        return self.crc_ok
+
+
+def join(parts: list[Frames]) -> Frames:
+    """Return all frames of `parts`, one after the other."""
+    return Frames(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Frames)))

@@ -1,0 +1,341 @@
+"""Bytes to frames: find every good frame of a byte stream, and say which bytes hold none.
+
+All magic bytes of a buffer are looked at together (header, length, checksum); then one tight loop walks
+from frame to frame. Where the walk meets damage it decides with the least that is certain:
+
+* a frame of a known id counts when its checksum holds;
+* a frame of an unknown id, or one whose checksum fails, counts as such only where another record follows
+  it exactly; otherwise the reader steps on by one byte;
+* after damage the reader goes on at the next frame whose checksum holds.
+
+No decision is made before the bytes it depends on are there, so the result does not depend on how a stream
+is cut into buffers.
+"""
+
+from __future__ import annotations
+
+import functools
+from bisect import bisect_left
+from typing import NamedTuple
+
+import numpy as np
+
+from mavframecheck.model import Damage
+from mavframecheck.wire.chunk import Chunk
+from mavframecheck.wire.crc import crc16_of_ranges
+from mavframecheck.wire.dialect import Dialect
+from mavframecheck.wire.frames import (
+    CHECKSUM,
+    HEADER_V1,
+    HEADER_V2,
+    LONGEST_FRAME,
+    SIGNATURE,
+    SIGNED_FLAG,
+    STAMP,
+    STX_V2,
+    Bools,
+    Frames,
+    Ints,
+)
+from mavframecheck.wire.stamps import Stamps
+
+PADDING = bytes(LONGEST_FRAME)
+"""Zeros behind a buffer, so that a header or payload window may reach over its end."""
+
+NO_RECORD, STOP = -1, -2
+CUT_OFF = "the frame is cut off"
+"""Why the end of a recording that was not closed holds no frame."""
+
+
+class Scan(NamedTuple):
+    """What one buffer of one flow held."""
+
+    buffer: bytes
+    """The bytes that `frames.start` points into, padded with zeros."""
+    frames: Frames
+    damage: list[Damage]
+
+
+class Framer:
+    """Finds the frames of one flow, buffer after buffer."""
+
+    def __init__(self, dialect: Dialect, *, stamped: bool) -> None:
+        """Read with the ids and checksum seeds of `dialect`; `stamped` where a stamp precedes each frame."""
+        self._dialect = dialect
+        self._gap = STAMP if stamped else 0
+        self._rest = Chunk(b"", np.zeros(0, np.int64), np.zeros(0, np.int64))
+        self._stamps = Stamps()
+
+    def feed(self, chunk: Chunk | None) -> Scan:
+        """Return the frames that are certain once `chunk` has arrived; None ends the flow."""
+        joined = self._rest if chunk is None else _append(self._rest, chunk)
+        buffer = joined.data + PADDING
+        walk = _Walk(buffer, len(joined.data), self._dialect, self._gap, final=chunk is None)
+        walk.run()
+        frames = self._frames(walk, joined)
+        damage = [
+            Damage(_offset_of(joined, first), last - first, reason)
+            for first, last, reason in walk.skipped
+        ]
+        self._rest = _drop(joined, walk.done)
+        return Scan(buffer, frames, damage)
+
+    def _frames(self, walk: _Walk, chunk: Chunk) -> Frames:
+        """Return the accepted candidates of `walk` with their headers, offsets and receive times."""
+        rows = np.array(walk.accepted, np.int64)
+        c, octets = walk.candidates, walk.octets
+        start = c.start[rows]
+        v2 = c.v2[rows]
+        piece = np.searchsorted(chunk.starts, start, side="right") - 1
+        t_us, has_stamp = self._receive_times(walk, chunk, start, piece, rows)
+        fields = start + np.where(v2, 4, 2)
+        payload = start + c.header[rows]
+        tail = payload + c.length[rows]
+        return Frames(
+            start=start,
+            payload=payload,
+            offset=chunk.offsets[piece] + start - chunk.starts[piece],
+            t_us=t_us,
+            t_valid=self._stamps.valid(t_us, has_stamp),
+            sysid=octets[fields + 1],
+            compid=octets[fields + 2],
+            seq=octets[fields],
+            msgid=c.msgid[rows],
+            length=octets[start + 1],
+            size=c.end[rows] - start,
+            version=(v2 + np.uint8(1)).astype(np.uint8),
+            signed=c.signed[rows],
+            known=c.known[rows],
+            crc_ok=c.good[rows],
+            checksum=octets[tail] | octets[tail + 1].astype(np.uint16) << 8,
+            number=np.zeros(len(rows), np.int64),
+        )
+
+    def _receive_times(
+        self, walk: _Walk, chunk: Chunk, start: Ints, piece: Ints, rows: Ints
+    ) -> tuple[Ints, Bools]:
+        """Return the receive time of each frame, us, and whether the recording has one."""
+        if not self._gap:
+            if chunk.t_us is None:
+                return np.zeros(len(start), np.int64), np.zeros(len(start), np.bool_)
+            return chunk.t_us[piece], np.ones(len(start), np.bool_)
+        previous_end = np.concatenate(([0], walk.candidates.end[rows[:-1]])) if len(rows) else start
+        has_stamp = start - STAMP >= previous_end
+        at = np.where(has_stamp, start - STAMP, 0)
+        windows = np.ndarray(len(walk.octets) - STAMP + 1, ">u8", walk.octets, strides=(1,))
+        stamps = np.minimum(windows[at], np.uint64(2**63 - 1)).astype(np.int64)
+        return np.where(has_stamp, stamps, 0), has_stamp
+
+
+class _Candidates:
+    """Every magic byte of a buffer, read as if a frame began there; all arrays are (m,)."""
+
+    def __init__(self, octets: np.typing.NDArray[np.uint8], size: int, dialect: Dialect) -> None:
+        self.start: Ints = np.flatnonzero((octets[:size] - np.uint8(STX_V2)) < 2)
+        at = self.start
+        self.v2: Bools = octets[at] == STX_V2
+        flags = octets[at + 2]
+        self.length: Ints = octets[at + 1].astype(np.int64)
+        self.header: Ints = np.where(self.v2, HEADER_V2, HEADER_V1)
+        self.signed: Bools = self.v2 & (flags == SIGNED_FLAG)
+        self.end: Ints = at + self.length + self.header + CHECKSUM + SIGNATURE * self.signed
+        wide = (
+            octets[at + 7]
+            | octets[at + 8].astype(np.int32) << 8
+            | octets[at + 9].astype(np.int32) << 16
+        )
+        self.msgid = np.where(self.v2, wide, octets[at + 5].astype(np.int32))
+        self.seeds = dialect.seeds(self.msgid)
+        self.known: Bools = self.seeds >= 0
+        self.whole: Bools = self.end <= size
+        self.readable: Bools = ~self.v2 | (flags <= SIGNED_FLAG)
+        self.good: Bools = np.zeros(len(at), np.bool_)
+        self.checked: Bools = np.zeros(len(at), np.bool_)
+
+
+class _Walk:
+    """One pass over one buffer. Positions are indices into it; `done` is how far it is decided."""
+
+    def __init__(
+        self, buffer: bytes, size: int, dialect: Dialect, gap: int, *, final: bool
+    ) -> None:
+        self.octets = np.frombuffer(buffer, np.uint8)
+        self.size = size
+        self.gap = gap
+        self.final = final
+        self.accepted: list[int] = []
+        self.skipped: list[tuple[int, int, str]] = []
+        self.done = 0
+        self.candidates = _Candidates(self.octets, size, dialect)
+        self._index_successors()
+
+    def run(self) -> None:
+        """Walk from frame to frame until the buffer, or what is certain of it, is used up."""
+        steps = self._steps()
+        accept = self.accepted.append
+        going = True
+        while going:
+            i = self._at(self.done + self.gap)
+            if i >= 0:
+                while (following := steps[i]) >= 0:
+                    accept(i)
+                    i = following
+                if following == NO_RECORD:
+                    accept(i)
+                if self.accepted:
+                    self.done = int(self.candidates.end[self.accepted[-1]])
+            going = self._settle(self._at(self.done + self.gap))
+
+    def _index_successors(self) -> None:
+        """Find, for each candidate, the candidate that begins where its record ends."""
+        c = self.candidates
+        self.slot = np.full(self.size + 2 * LONGEST_FRAME, NO_RECORD, np.int32)
+        self.slot[c.start] = np.arange(len(c.start), dtype=np.int32)
+        self.successor = self.slot[c.end + self.gap]
+        self.ends_file: Bools = (c.end == self.size) & self.final
+        self.followed: Bools = c.whole & c.readable & ((self.successor >= 0) | self.ends_file)
+
+    def _steps(self) -> list[int]:
+        """Return where the fast walk goes from each candidate: its successor, or STOP to look closer."""
+        c = self.candidates
+        self._check(np.flatnonzero(c.known & self.followed))
+        after = self.successor
+        certain = c.good | (~c.known & self.followed & (after >= 0) & c.good[after])
+        steps: list[int] = np.where(certain, after, STOP).tolist()
+        return steps
+
+    def _check(self, rows: Ints) -> None:
+        """Compute the checksums of the candidates at `rows` that were not computed yet."""
+        c = self.candidates
+        rows = rows[~c.checked[rows]]
+        if not len(rows):
+            return
+        start = c.start[rows]
+        covered = c.length[rows] + c.header[rows] - 1
+        crc = crc16_of_ranges(self.octets, start + 1, covered, c.seeds[rows].astype(np.uint8))
+        tail = start + 1 + covered
+        received = self.octets[tail] | self.octets[tail + 1].astype(np.uint16) << 8
+        c.good[rows] = crc == received
+        c.checked[rows] = True
+
+    def _at(self, position: int) -> int:
+        """Return the candidate that begins at `position`, or NO_RECORD."""
+        return int(self.slot[position]) if position < self.size else NO_RECORD
+
+    def _is_good(self, i: int) -> bool:
+        c = self.candidates
+        if c.known[i] and c.readable[i] and c.whole[i]:
+            self._check(np.array([i]))
+        return bool(c.good[i])
+
+    def _settle(self, i: int) -> bool:
+        """Decide about the record due at `done`, candidate `i`; return whether the walk can go on."""
+        c = self.candidates
+        if i < 0:
+            waiting = self.done + self.gap >= self.size and not self.final
+            return False if waiting else self._resume("no frame begins where one is due")
+        if not c.readable[i]:
+            return self._resume("a frame with flags that this reader does not know")
+        if not c.whole[i]:
+            return self._resume(CUT_OFF) if self.final else False
+        if self._is_good(i):
+            return self._accept(i)
+        follows = self._record_follows(i)
+        if follows is None:
+            return False
+        if follows:
+            return self._accept(i)
+        return self._resume("no checksum that holds, and no record behind it")
+
+    def _accept(self, i: int) -> bool:
+        self.accepted.append(i)
+        self.done = int(self.candidates.end[i])
+        return True
+
+    def _record_follows(self, i: int) -> bool | None:
+        """Return whether a record begins exactly behind candidate `i`; None when more bytes must tell."""
+        c = self.candidates
+        if self.ends_file[i]:
+            return True
+        if c.end[i] + self.gap >= self.size:
+            return False if self.final else None
+        following = int(self.successor[i])
+        if following < 0 or not c.readable[following]:
+            return False
+        if not c.whole[following]:
+            return False if self.final else None
+        if self._is_good(following) or self.followed[following]:
+            return True
+        return None if c.end[following] + self.gap >= self.size and not self.final else False
+
+    def _resume(self, reason: str) -> bool:
+        """Skip to the next frame whose checksum holds; return False when the buffer has no more."""
+        position = self.done + self.gap
+        target = _next(self._good_starts, position + 1)
+        if not self.final:
+            unsettled = _next(self._cut_starts, position)
+            if unsettled is None and target is None:
+                unsettled = self.size
+            if unsettled is not None and (target is None or unsettled < target):
+                self._skip_to(unsettled - self.gap, reason)
+                return False
+        self._skip_to(self.size if target is None else target - self.gap, reason)
+        return target is not None and self._accept(self._at(target))
+
+    @functools.cached_property
+    def _good_starts(self) -> list[int]:
+        """Starts of all frames whose checksum holds, whether the walk comes by them or not."""
+        c = self.candidates
+        self._check(np.flatnonzero(c.known & c.whole & c.readable))
+        starts: list[int] = c.start[c.good].tolist()
+        return starts
+
+    @functools.cached_property
+    def _cut_starts(self) -> list[int]:
+        """Starts of what may be frames that the end of the buffer cuts off."""
+        c = self.candidates
+        starts: list[int] = c.start[~c.whole & c.readable].tolist()
+        return starts
+
+    def _skip_to(self, position: int, reason: str) -> None:
+        if position > self.done:
+            self.skipped.append((self.done, position, reason))
+            self.done = position
+
+
+def _next(starts: list[int], position: int) -> int | None:
+    """Return the first of the ascending `starts` that is not before `position`."""
+    k = bisect_left(starts, position)
+    return starts[k] if k < len(starts) else None
+
+
+def _append(rest: Chunk, chunk: Chunk) -> Chunk:
+    """Return `rest` continued by `chunk`."""
+    shift = len(rest.data)
+    t_us = None
+    if chunk.t_us is not None:
+        t_us = chunk.t_us if rest.t_us is None else np.concatenate((rest.t_us, chunk.t_us))
+    return Chunk(
+        rest.data + chunk.data,
+        np.concatenate((rest.starts, chunk.starts + shift)),
+        np.concatenate((rest.offsets, chunk.offsets)),
+        t_us,
+        chunk.flow,
+    )
+
+
+def _drop(chunk: Chunk, done: int) -> Chunk:
+    """Return what follows the first `done` bytes of `chunk`."""
+    first = max(int(np.searchsorted(chunk.starts, done, side="right")) - 1, 0)
+    starts, offsets = chunk.starts[first:] - done, chunk.offsets[first:].copy()
+    if len(starts) and starts[0] < 0:
+        offsets[0] -= starts[0]
+        starts[0] = 0
+    t_us = None if chunk.t_us is None else chunk.t_us[first:]
+    return Chunk(chunk.data[done:], starts, offsets, t_us, chunk.flow)
+
+
+def _offset_of(chunk: Chunk, position: int) -> int:
+    """Return the offset in the recording of an index into `chunk`."""
+    piece = int(np.searchsorted(chunk.starts, position, side="right")) - 1
+    return int(chunk.offsets[piece] + position - chunk.starts[piece])

@@ -1,0 +1,58 @@
+"""The bar: only for a person, only when the work is long, and gone when it is done."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+
+import pytest
+
+from mavframecheck.cli import progress
+from mavframecheck.cli.progress import Progress
+
+
+class Terminal(io.StringIO):
+    """A standard error that somebody watches."""
+
+    def isatty(self) -> bool:
+        """Return that somebody does."""
+        return True
+
+
+def watch(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """Watch standard error (no fixture: pytest puts its own in place before each test)."""
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    return terminal
+
+
+def test_no_bar_in_a_pipe() -> None:
+    """The engine is not even asked to count."""
+    with Progress(1).of("a.tlog") as advance:
+        assert advance is None
+
+
+def test_no_bar_for_short_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What ends within a second shows nothing."""
+    watched = watch(monkeypatch)
+    with Progress(1).of("a.tlog") as advance:
+        assert advance
+        advance(10)
+    assert watched.getvalue() == ""
+
+
+def test_bar_names_the_file_and_disappears(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A hostile name cannot write to the terminal; the next file has its own bar."""
+    watched = watch(monkeypatch)
+    monkeypatch.setattr(progress, "PATIENCE_S", -1.0)
+    path = tmp_path / "a[red]\x1b[2J.tlog"
+    path.write_bytes(bytes(100))
+    both = Progress(2)
+    for number in ("1/2", "2/2"):
+        with both.of(str(path)) as advance:
+            assert advance
+            advance(50)
+        assert rf"{number} a[red]\x1b[2J.tlog" in watched.getvalue()
+    assert "\x1b[2J" not in watched.getvalue()
