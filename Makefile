@@ -30,6 +30,8 @@ check: $(READY)  ## lint, format, types
 
 generate: $(READY)  ## write again what is generated into the package
 	$(BIN)/python -m mavframecheck.wire.generate
+	$(BIN)/python -m mavframecheck.engine.pack
+	$(BIN)/python -m mavframecheck.report.schema
 
 samples: $(READY)  ## write samples/ again
 	$(BIN)/python -m samples.make

@@ -27,7 +27,8 @@ class Observation(NamedTuple):
     subject: Subject
     first: Place
     last: Place
-    count: int
+    times: int
+    """How often."""
     values: Mapping[str, Scalar]
 
 

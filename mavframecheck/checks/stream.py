@@ -248,9 +248,8 @@ class LostFrames(Check):
 
     def _one_counter(self, sender: int) -> bool:
         """Return whether the counter of a sender runs forward, as one on a single link does."""
-        return (
-            self._backwards[sender] <= self.params["max_backwards_share"] * self._received[sender]
-        )
+        allowed = self.params["max_backwards_share"] * self._received[sender]
+        return bool(self._backwards[sender] <= allowed)
 
     def verdict(self) -> Verdict:
         """Return the frames of senders with one running counter."""

@@ -13,7 +13,7 @@ from mavframecheck.model import Severity
 from mavframecheck.report import Checked
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.words import plural
-from mavframecheck.sources import SourceError, expand
+from mavframecheck.sources import NoRecordingError, SourceError, expand
 from mavframecheck.wire import DialectError
 
 CLEAN, FINDINGS, FAILED, NOTHING, INTERRUPTED = 0, 1, 2, 3, 130
@@ -27,6 +27,7 @@ class Audit:
         self._pack = pack
         self._settings = settings
         self._unreadable = 0
+        self._refused = 0
         self._frames = 0
         self._worst = -1
         self._interrupted = False
@@ -46,7 +47,7 @@ class Audit:
         """Return the exit code once the results are used up."""
         if self._interrupted:
             return INTERRUPTED
-        if self._unreadable:
+        if self._unreadable or (self._refused and self._frames):
             return FAILED
         if not self._frames:
             return NOTHING
@@ -85,6 +86,9 @@ class Audit:
 
     def _fail(self, path: str, error: SourceError | OSError) -> None:
         """Say which file cannot be read and why; the message may name it already."""
-        self._unreadable += 1
+        if isinstance(error, NoRecordingError):
+            self._refused += 1
+        else:
+            self._unreadable += 1
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         complain(sentence(reason if path in reason else f"{path}: {reason}"))

@@ -127,7 +127,7 @@ def _vehicles(context: Context, traffic: Traffic) -> list[Vehicle]:
     counts: dict[tuple[int, int], int] = {}
     for stream in traffic.streams():
         key = (stream.sysid, stream.compid)
-        counts[key] = counts.get(key, 0) + stream.count
+        counts[key] = counts.get(key, 0) + stream.frames
     return [_vehicle(context, sysid, compid, count) for (sysid, compid), count in counts.items()]
 
 

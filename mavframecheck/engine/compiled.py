@@ -17,6 +17,7 @@ from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.enums import FrameKind, Quantity
 from mavframecheck.semantics.mavframe import frames_of
 from mavframecheck.semantics.tags import Condition, FieldTag
+from mavframecheck.vehicle.context import source_of
 
 OWN_NAMES = frozenset({"message", "field"})
 """Names that every rule knows: the message and the field that it is looking at."""
@@ -59,17 +60,28 @@ class CompiledRule:
 
     @property
     def required(self) -> frozenset[str]:
-        """Context that a row must have before it is judged."""
+        """Context that a row must have before it is judged.
+
+        What `when` asks about with known() is not among it: there the rule decides for itself.
+        """
         found = {"vehicle.autopilot"} if self.rule.applies.autopilot else set()
-        return frozenset(found.union(*map(self._contexts, (self.when, self.flag))) - ALWAYS_KNOWN)
+        found = found.union(*map(self._contexts, (self.when, self.flag)))
+        tested = {source_of(name) for name in (self.when.tested if self.when is not None else ())}
+        return frozenset(n for n in found - ALWAYS_KNOWN if source_of(n) not in tested)
 
     @property
-    def wanted(self) -> frozenset[str]:
-        """Context that severity and words speak of: worth waiting for, not needed to judge."""
+    def judged_by(self) -> frozenset[str]:
+        """All context that decides whether a row is judged, and how."""
+        return (self.required | self._contexts(self.when)) - ALWAYS_KNOWN
+
+    @property
+    def awaited(self) -> frozenset[str]:
+        """Context worth waiting for: what judging, severity and words speak of."""
         spoken = [condition for condition, _ in self.severities]
         for template in (self.text, self.fix, *self.evidence.values()):
             spoken += template.expressions
-        return frozenset(set().union(*map(self._contexts, (self.worst, *spoken))) - ALWAYS_KNOWN)
+        named = map(self._contexts, (self.when, self.worst, *spoken))
+        return self.required.union(*named) - ALWAYS_KNOWN
 
     def _contexts(self, expression: Expression | None) -> set[str]:
         if expression is None:

@@ -83,6 +83,8 @@ class Expression:
         self.source = source
         self.contexts: set[str] = set()
         """Context columns it reads."""
+        self.tested: set[str] = set()
+        """Those of them that it asks about with known()."""
         self.used_names: set[str] = set()
         self._names = names
         self._evaluate = self._compile(_parse(source))
@@ -230,10 +232,11 @@ class Expression:
         return lambda scope: scope.field(function, field)
 
     def _known(self, node: ast.Call) -> Evaluate:
-        """``known(home.lat)``: the rule waits for this context, and judges only rows that have it."""
+        """Compile ``known(home.lat)``: whether this context has come, or came in time."""
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Attribute):
             raise _error(node, "known() takes one context name, as in known(home.lat)")
         value = self._attribute(node.args[0])
+        self.tested.add(ast.unparse(node.args[0]))
 
         def evaluate(scope: Scope) -> Any:
             found = value(scope)

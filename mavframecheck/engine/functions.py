@@ -15,6 +15,7 @@ FIELD_FUNCTIONS = frozenset(
         "ignored",
         "unknown",
         "any_unknown",
+        "any_nan",
         "undefined",
         "present",
         "quaternion",
@@ -26,7 +27,8 @@ FIELD_FUNCTIONS = frozenset(
 """Functions of a field, by name; `engine.rows` answers them.
 
 raw: as on the wire; si: in SI by the catalogue (latitude and longitude in degrees); used, ignored: by the
-field's own ignore bit; unknown: a sentinel that says "not known" (any_unknown: in any element);
+field's own ignore bit; unknown: a sentinel that says "not known" (any_unknown: in any element; any_nan:
+any element is NaN, and that is no sentinel);
 undefined: the bits of a mask, or the value of an enumeration, that the standard does not define; present: given by the sender (extension
 fields); diagonal: (n, k) variances of a covariance; correlation: (n,) the largest squared correlation of a
 covariance, above 1 when it is none; words: for texts, what a mask, frame or enumeration value means.
@@ -71,6 +73,12 @@ def float32_step(value: Any) -> Any:
     return np.spacing(np.abs(value).astype(np.float32)).astype(np.float64)
 
 
+def fixed(value: Any, digits: int) -> Any:
+    """Return numbers as texts with `digits` decimals, for texts of findings."""
+    flat = [f"{number:.{int(digits)}f}" for number in np.ravel(value).tolist()]
+    return np.array(flat).reshape(np.shape(value))
+
+
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": np.abs,
     "min": np.minimum,
@@ -88,5 +96,6 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "smallest": smallest,
     "norm": norm,
     "distance_km": distance_km,
+    "fixed": fixed,
     "float32_step": float32_step,
 }

@@ -5,8 +5,8 @@ Everything is computed once per table and shared by all rules that ask for it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from mavframecheck.wire.table import join as join_tables
 
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
+T = TypeVar("T")
 
 
 class Rows:
@@ -120,8 +121,14 @@ class Rows:
 
     def any_unknown(self, tag: FieldTag) -> Bools:
         """Return (n,) whether any element of a field is unknown."""
-        unknown = self.unknown(tag)
-        return unknown.any(axis=1) if unknown.ndim > 1 else unknown
+        return _any_element(self.unknown(tag))
+
+    def any_nan(self, tag: FieldTag) -> Bools:
+        """Return (n,) whether any element of a field is NaN where that is no sentinel for "not known"."""
+        raw = self.raw(tag.field)
+        if raw.dtype.kind != "f":
+            return np.zeros(len(self), np.bool_)
+        return _any_element(np.isnan(raw) & ~self.unknown(tag))
 
     def undefined(self, tag: FieldTag) -> Any:
         """Return (n,) the bits of a mask, or the value of an enumeration, that the standard does not define."""
@@ -159,11 +166,12 @@ class Rows:
             return [str(value) for value in values]
         return [f"{value} ({entry_name(enum, value)})" for value in values]
 
-    def cached(self, key: tuple[object, ...], compute: Any) -> Any:
+    def cached(self, key: tuple[object, ...], compute: Callable[[], T]) -> T:
         """Return what `compute` gives, computed once for `key`."""
         if key not in self._cache:
             self._cache[key] = compute()
-        return self._cache[key]
+        found: T = self._cache[key]
+        return found
 
 
 def join(parts: Sequence[Rows]) -> Rows:
@@ -182,7 +190,7 @@ def join(parts: Sequence[Rows]) -> Rows:
 def widened(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Return integers as int64 (the largest uint64 values clipped), floats as float64, texts as they are."""
     if column.dtype.kind == "u" and column.dtype.itemsize == 8:
-        return np.minimum(column, np.uint64(2**63 - 1)).astype(np.int64)
+        column = np.minimum(column, np.uint64(2**63 - 1))
     if column.dtype.kind in "iu":
         return column.astype(np.int64)
     if column.dtype.kind == "f":
@@ -202,6 +210,11 @@ def _matches(sentinel: Sentinel, raw: npt.NDArray[Any]) -> Bools:
         return np.asarray(hit)
     whole = hit[:, 0] if sentinel.scope == "first" else hit.all(axis=1)
     return np.broadcast_to(whole[:, None], raw.shape)
+
+
+def _any_element(column: Bools) -> Bools:
+    """Return (n,) whether any element of each row holds."""
+    return np.asarray(column.reshape(len(column), -1).any(axis=1))
 
 
 def _per_row(rows: Bools, column: npt.NDArray[Any]) -> Bools:

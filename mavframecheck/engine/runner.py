@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from mavframecheck.engine.rows import Rows
 from mavframecheck.engine.scope import RuleScope, ValueScope
 from mavframecheck.engine.template import Template, first_value, plain
 from mavframecheck.engine.waiting import Queue
-from mavframecheck.model import Evidence, Finding, RuleRun, Severity, Subject
+from mavframecheck.model import Evidence, Finding, RuleRun, Scalar, Severity, Subject
 from mavframecheck.semantics import catalogue
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.context import MISSING
@@ -89,14 +88,14 @@ class Runner:
     def _desks_for(self, message: str) -> list[_Desk]:
         """Bind every rule to a message that is seen for the first time."""
         if message not in self._desks:
-            desks: dict[frozenset[str], _Desk] = {}
+            desks: dict[tuple[str, ...], _Desk] = {}
             for rule in self._rules:
                 labelled: dict[str | None, list[Binding]] = {}
                 for binding in bind(rule, message):
                     labelled.setdefault(binding.label, []).append(binding)
                 if labelled:
-                    names = rule.required | rule.wanted
-                    desk = desks.setdefault(names, _Desk(Queue(tuple(sorted(names))), []))
+                    names = tuple(sorted(rule.awaited))
+                    desk = desks.setdefault(names, _Desk(Queue(names), []))
                     desk.rules += [(rule, label, bindings) for label, bindings in labelled.items()]
             self._desks[message] = list(desks.values())
         return self._desks[message]
@@ -112,8 +111,11 @@ class Runner:
 
     def _judge(
         self, rule: CompiledRule, label: str | None, bindings: list[Binding], rows: Rows
-    ) -> None:
-        """Let one rule look at rows; several bindings with one label (views of one field) act as one."""
+    ) -> Bools:
+        """Let one rule look at rows; return (n,) those it judged.
+
+        Several bindings with one label (views of one field) act as one.
+        """
         looked = np.zeros(len(rows), np.bool_)
         hit = np.zeros(len(rows), np.bool_)
         badness = np.zeros(len(rows))
@@ -125,7 +127,7 @@ class Runner:
             scope = RuleScope(rows, binding)
             if rule.when is not None:
                 seen &= rule.when(scope)
-            found = seen & _any_element(rule.flag(scope)) & ~hit
+            found = seen & rule.flag(scope) & ~hit
             looked |= seen
             hit |= found
             by[found] = k
@@ -136,6 +138,7 @@ class Runner:
         self._tallies[rule.rule.code].checked += int(looked.sum())
         if looked.any():
             self._collect(rule, label, bindings, rows, looked, hit, badness, by)
+        return looked
 
     def _collect(
         self,
@@ -176,17 +179,16 @@ class Runner:
             return
         for rule, label, bindings in desk.rules:
             decidable = rows.complete(rule.required)
+            looked = np.zeros(len(rows), np.bool_)
             if decidable.any():
-                self._judge(rule, label, bindings, rows.take(decidable))
-            stuck = rows.take(~decidable)
-            concerned = np.zeros(len(stuck), np.bool_)
-            for binding in bindings:
-                concerned |= _concerns(rule, binding, stuck)
-            if concerned.any():
+                looked[decidable] = self._judge(rule, label, bindings, rows.take(decidable))
+            stuck = ~looked & ~rows.complete(rule.judged_by)
+            if stuck.any():
+                concerned = stuck & np.any([_concerns(rule, b, rows) for b in bindings], axis=0)
                 tally = self._tallies[rule.rule.code]
                 tally.late += int(concerned.sum())
                 tally.missing |= {
-                    n for n in rule.required if not stuck.context(n).known[concerned].all()
+                    n for n in rule.judged_by if not rows.context(n).known[concerned].all()
                 }
 
     def _run_of(self, rule: CompiledRule) -> RuleRun:
@@ -198,12 +200,6 @@ class Runner:
         if tally.late:
             return RuleRun(code=code, status="insufficient-data", reason=why)
         return RuleRun(code=code, status="not-applicable", reason=_what_was_missing(rule))
-
-
-def _any_element(column: Any) -> Any:
-    """Return (n,) whether any element of a row holds; a scalar stays one."""
-    array = np.asarray(column)
-    return array.any(axis=1) if array.ndim > 1 else array
 
 
 def _concerns(rule: CompiledRule, binding: Binding, rows: Rows) -> Bools:
@@ -241,7 +237,7 @@ def _streams(rows: Rows) -> np.typing.NDArray[np.int64]:
     table = rows.table
     stream = table.frames.sender
     if "target_system" in table.layout.by_name:
-        stream = stream * 256 + table["target_system"]
+        stream = stream * 256 + rows.raw("target_system")
     instance = next((t.instance_field for t in catalogue.tags(table.name) if t.instance_field), "")
     if instance in table.layout.by_name and table[instance].dtype.kind in "iu":
         stream = stream * 2**16 + (rows.raw(instance) & 0xFFFF)
@@ -262,7 +258,7 @@ def _words(rule: CompiledRule, scope: RuleScope | ValueScope) -> Words:
 
 def _evidence(
     templates: dict[str, Template], scope: RuleScope | ValueScope
-) -> Iterator[tuple[str, object]]:
+) -> Iterator[tuple[str, Scalar]]:
     for key in ("expected", "observed", "unit", "frame"):
         yield key, None
     for key, template in templates.items():
@@ -283,20 +279,20 @@ def _episode(rule: CompiledRule, observation: Observation) -> Episode:
         first=Mark(*observation.first),
         last=Mark(*observation.last),
         words=words._replace(evidence=evidence),
-        count=observation.count,
-        judged=observation.count,
+        count=observation.times,
+        judged=observation.times,
     )
 
 
 def _verdict_of(rule: CompiledRule, check: Check) -> RuleRun:
     verdict = check.verdict()
+    code, checked = rule.rule.code, verdict.checked
     if verdict.insufficient:
-        status, reason = "insufficient-data", verdict.insufficient
-    elif verdict.checked:
-        status, reason = "ran", ""
-    else:
-        status, reason = "not-applicable", _what_was_missing(rule)
-    return RuleRun(code=rule.rule.code, status=status, reason=reason, checked=verdict.checked)
+        reason = verdict.insufficient
+        return RuleRun(code=code, status="insufficient-data", reason=reason, checked=checked)
+    if checked:
+        return RuleRun(code=code, status="ran", checked=checked)
+    return RuleRun(code=code, status="not-applicable", reason=_what_was_missing(rule))
 
 
 def _what_was_missing(rule: CompiledRule) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -32,9 +32,8 @@ class RuleScope:
         if function == "words":
             return self.rows.words(field, tag)
         if tag is None:
-            self._refuse(
-                f"{function}({name}): the catalogue has no meaning for {self.binding.message}.{field}"
-            )
+            meant = f"{self.binding.message}.{field}"
+            self._refuse(f"{function}({name}): the catalogue has no meaning for {meant}")
         if function == "quaternion":
             return self.rows.quaternion(tag, self.binding.partners)
         return _OF_TAG[function](self.rows, tag)
@@ -55,7 +54,7 @@ class RuleScope:
         """Return the values of a context column."""
         return self.rows.context(name).values
 
-    def _refuse(self, problem: str) -> Any:
+    def _refuse(self, problem: str) -> NoReturn:
         message = f"rule {self.binding.rule.rule.code}: {problem}"
         raise RuleFileError(message)
 
@@ -98,6 +97,7 @@ _OF_TAG: dict[str, Callable[[Rows, FieldTag], Any]] = {
     "ignored": _ignored,
     "unknown": Rows.unknown,
     "any_unknown": Rows.any_unknown,
+    "any_nan": Rows.any_nan,
     "undefined": Rows.undefined,
     "diagonal": Rows.diagonal,
     "correlation": Rows.correlation,

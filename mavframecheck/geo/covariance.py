@@ -12,8 +12,8 @@ def squared_correlation(flat: Floats, diagonal: tuple[int, ...]) -> Floats:
     """Return (n,) the largest ``c_ij^2 / (c_ii c_jj)`` of each covariance, NaN where none can be formed.
 
     `flat` is (n, k): an upper-right triangle or a full matrix, row by row, with its variances at
-    `diagonal`. A covariance has no value above 1 (Cauchy-Schwarz). Elements that are NaN and pairs
-    with a variance of zero are left out.
+    `diagonal`. A covariance has no value above 1 (Cauchy-Schwarz); infinity stands for a correlation with
+    something that has no variance. Elements that are NaN are left out.
     """
     rows, columns, places = _off_diagonal(flat.shape[1], diagonal)
     if not len(places):
@@ -21,7 +21,8 @@ def squared_correlation(flat: Floats, diagonal: tuple[int, ...]) -> Floats:
     variances = flat[:, list(diagonal)]
     with np.errstate(all="ignore"):
         product = variances[:, rows] * variances[:, columns]
-        ratio = np.where(product > 0, np.square(flat[:, places]) / product, np.nan)
+        square = np.square(flat[:, places])
+        ratio = np.where((product > 0) | (square > 0), square / np.maximum(product, 0), np.nan)
     largest: Floats = np.fmax.reduce(ratio, axis=1)
     return largest
 

@@ -44,8 +44,9 @@ class Subject(msgspec.Struct, frozen=True, order=True):
     field: str | None = None
 
     def __str__(self) -> str:
-        """Return ``1/191 ODOMETRY.q``, leaving out what is not known."""
-        sender = "" if self.sysid is None else f"{self.sysid}/{self.compid}"
+        """Return ``1/191 ODOMETRY.q``, leaving out what is not known; ``1/*`` is all of a system."""
+        component = "*" if self.compid is None else self.compid
+        sender = "" if self.sysid is None else f"{self.sysid}/{component}"
         stream = ".".join(part for part in (self.message, self.field) if part)
         return " ".join(part for part in (sender, stream) if part)
 

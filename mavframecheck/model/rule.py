@@ -32,7 +32,7 @@ class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
     """Common settings: an unknown key in a rule file is an error that names it."""
 
 
-class Applies(_Part):
+class Applies(_Part, frozen=True):
     """Which rows a rule judges. Keys are AND; a list is any of its values; a leading ``!`` is not."""
 
     message: tuple[str, ...] = ()
@@ -53,7 +53,7 @@ class Applies(_Part):
     """One finding per message stream, per tagged field, or per group of fields."""
 
 
-class Persist(_Part):
+class Persist(_Part, frozen=True):
     """How much of it makes a finding: all that are given must hold within one episode."""
 
     count: int = 1
@@ -64,7 +64,7 @@ class Persist(_Part):
     """Hits per judged row between first and last hit, 0..1."""
 
 
-class Detect(_Part):
+class Detect(_Part, frozen=True):
     """What is looked for: expressions on columns, or the name of a Python check."""
 
     when: str = ""
@@ -75,14 +75,14 @@ class Detect(_Part):
     """Expression whose largest magnitude marks the worst row of an episode."""
 
 
-class SeverityWhen(_Part):
+class SeverityWhen(_Part, frozen=True):
     """Another severity where an expression holds on the first hit."""
 
     condition: str = msgspec.field(name="if")
     severity: Severity
 
 
-class Explain(_Part):
+class Explain(_Part, frozen=True):
     """What people read: `text` of the finding, why it matters, how to mend it, where it is written."""
 
     text: str
@@ -91,7 +91,7 @@ class Explain(_Part):
     references: tuple[str, ...] = ()
 
 
-class Step(_Part):
+class Step(_Part, frozen=True):
     """One message of an example, or `repeat` of them `every` seconds apart."""
 
     message: str
@@ -105,7 +105,7 @@ class Step(_Part):
     """What goes wrong on the way: the checksum breaks, the frame is lost, or it arrives twice."""
 
 
-class Example(_Part):
+class Example(_Part, frozen=True):
     """A small recording that must, or must not, make the rule speak."""
 
     expect: Literal["bad", "good"]
@@ -116,7 +116,7 @@ class Example(_Part):
     note: str = ""
 
 
-class Rule(_Part):
+class Rule(_Part, frozen=True):
     """One rule file."""
 
     code: str

@@ -3,7 +3,7 @@
 from mavframecheck.sources.paths import STDIN, Inputs, Stdin, expand
 from mavframecheck.sources.recording import Recording, open_recording
 from mavframecheck.sources.sniff import MISSIONS, RECORDINGS, Kind, sniff
-from mavframecheck.sources.stream import SourceError
+from mavframecheck.sources.stream import NoRecordingError, SourceError
 
 __all__ = [
     "MISSIONS",
@@ -11,6 +11,7 @@ __all__ = [
     "STDIN",
     "Inputs",
     "Kind",
+    "NoRecordingError",
     "Recording",
     "SourceError",
     "Stdin",

@@ -11,7 +11,7 @@ from typing import BinaryIO, Self
 
 from mavframecheck.sources.paths import STDIN
 from mavframecheck.sources.sniff import RECORDINGS, REFUSALS, Kind, sniff_stream
-from mavframecheck.sources.stream import ByteStream, SourceError, open_stream
+from mavframecheck.sources.stream import ByteStream, NoRecordingError, SourceError, open_stream
 from mavframecheck.wire.chunk import Chunk, whole
 
 _STDIN_NAME = "<stdin>"
@@ -83,7 +83,7 @@ def open_recording(path: str | Path, input_kind: str | None = None) -> Recording
             opened.callback(file.close)
         recording = Recording(name, file, kind)
         if recording.kind not in RECORDINGS:
-            raise SourceError(f"{name}: this {REFUSALS[recording.kind]}")
+            raise NoRecordingError(f"{name}: this {REFUSALS[recording.kind]}")
         opened.pop_all()  # from here on the recording closes it
     return recording
 

@@ -19,6 +19,10 @@ class SourceError(Exception):
     """A source cannot be read; the message tells a person what, where, and what to do about it."""
 
 
+class NoRecordingError(SourceError):
+    """What was named can be read, but is no MAVLink recording; the message says what it is instead."""
+
+
 class ByteStream:
     """A forward-only stream over `pull(n)`, which gives at most n bytes, and b"" at the end."""
 

@@ -7,7 +7,7 @@ the row is about, `sender.*` of the component that sent it.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,11 @@ CONTEXT_NAMES: dict[str, tuple[str, str]] = {
     "home.alt_msl": ("home", "alt_msl"),
 }
 """Name in an expression -> (history, quantity in it)."""
+
+
+def source_of(name: str) -> str:
+    """Return which history a context name is read from: names of one history come together."""
+    return CONTEXT_NAMES[name][0]
 
 
 class Known(NamedTuple):
@@ -90,7 +95,7 @@ class Context:
         said = self.histories["roles"].values("role", answer)
         return np.where(answer.found, said, roles.role_table()[sender])
 
-    def last(self, history: str, quantity: str, key: int, otherwise: object) -> object:
+    def last(self, history: str, quantity: str, key: int, otherwise: Any) -> Any:
         """Return the last value of a quantity for one system or sender, `otherwise` when none was said."""
         found = self.histories[history].last(quantity, key)
         return otherwise if found is None else found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ from mavframecheck.wire import Frames
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
-Values = npt.NDArray[np.generic]
+Values = npt.NDArray[Any]
 
 LATE_FRAMES = 20_000
 LATE_US = 60_000_000
@@ -25,7 +25,7 @@ class Asked(NamedTuple):
 
     key: Ints
     """System or sender; negative where it is not known whom the row is about."""
-    index: Ints
+    number: Ints
     """Running number of the frame."""
     t_us: Ints
     t_valid: Bools
@@ -88,7 +88,7 @@ class History:
         """Find, for each row, the last value said before it, else (if `late`) the first one soon after it."""
         if not len(self._order):
             return Answer(np.zeros(len(asked.key), np.int64), np.zeros(len(asked.key), np.bool_))
-        wanted = asked.key << _INDEX_BITS | asked.index
+        wanted = asked.key << _INDEX_BITS | asked.number
         after = np.searchsorted(self._order, wanted, side="left")
         before = np.maximum(after - 1, 0)
         said = (after > 0) & (self._order[before] >> _INDEX_BITS == asked.key)
@@ -108,10 +108,9 @@ class History:
             return np.full(len(answer.place), blank)
         return np.where(answer.found, self._values[name][answer.place], blank)
 
-    def last(self, name: str, key: int) -> object:
+    def last(self, name: str, key: int) -> Any:
         """Return the last value of the quantity `name` for one key, None when there is none."""
         place = int(np.searchsorted(self._order, (key + 1) << _INDEX_BITS)) - 1
         if place < 0 or self._order[place] >> _INDEX_BITS != key:
             return None
-        value: object = self._values[name][place]
-        return value
+        return self._values[name][place]

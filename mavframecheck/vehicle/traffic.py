@@ -21,7 +21,7 @@ class Stream(NamedTuple):
     sysid: int
     compid: int
     message: str
-    count: int
+    frames: int
 
 
 class Traffic:

@@ -46,7 +46,8 @@ def _distance_tables() -> npt.NDArray[np.uint16]:
 def _pair_table(distance: int) -> npt.NDArray[np.uint16]:
     """(65536,) contribution of two bytes, the second of which is followed by `distance` further bytes."""
     tables = _distance_tables()
-    return np.bitwise_xor.outer(tables[distance], tables[distance + 1]).reshape(-1)
+    pairs: npt.NDArray[np.uint16] = np.bitwise_xor.outer(tables[distance], tables[distance + 1])
+    return pairs.reshape(-1)
 
 
 @functools.cache
@@ -98,6 +99,6 @@ def crc16_of_ranges(
         for k in range(WORD // 2):
             crc[:active] ^= _pair_table(distance + WORD - 2 - 2 * k).take(pairs[:, k])
         distance += WORD
-    result = np.empty_like(crc)
+    result = np.empty(len(order), np.uint16)
     result[order] = crc
     return result

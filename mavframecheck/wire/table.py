@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from mavframecheck.wire.dialect import Layout
 from mavframecheck.wire.frames import Bools, Frames, Ints
 from mavframecheck.wire.frames import join as join_frames
 
-Column = npt.NDArray[np.generic]
+Column = npt.NDArray[Any]
 
 
 class Table:
@@ -130,14 +130,10 @@ def _by_id(frames: Frames, good: Bools) -> list[tuple[int, Ints]]:
     """Return (message id, rows in order) of the `good` frames."""
     rows = np.flatnonzero(good)
     ids = frames.msgid[rows]
-    order = np.argsort(
-        ids.astype(np.uint16) if ids.size and ids.max() < 2**16 else ids, kind="stable"
-    )
-    rows, ids = rows[order], ids[order]
-    edges = (
-        np.flatnonzero(np.concatenate(([True], ids[1:] != ids[:-1], [True]))) if len(ids) else [0]
-    )
-    return [(int(ids[a]), rows[a:b]) for a, b in itertools.pairwise(edges)]
+    narrow = ids.astype(np.uint16) if not len(ids) or ids.max() < 2**16 else ids
+    order = np.argsort(narrow, kind="stable")
+    groups = np.split(rows[order], np.flatnonzero(np.diff(ids[order])) + 1)
+    return [(int(frames.msgid[group[0]]), group) for group in groups if len(group)]
 
 
 def _payloads(buffer: npt.NDArray[np.uint8], frames: Frames, group: _Group) -> npt.NDArray[np.void]:

@@ -10,6 +10,7 @@ import pytest
 from mavframecheck.engine import RuleFileError, SettingsError
 from mavframecheck.report import Checked
 from mavframecheck.sources import SourceError
+from mavframecheck.wire import DialectError
 from tests.cli.conftest import FakeEngine, Run
 from tests.report import made_up
 
@@ -153,6 +154,9 @@ def test_bad_settings_and_rule_files_are_usage_errors(
     engine.answers["a.tlog"] = SettingsError("no dialect is called commom")
     result = run("check", "a.tlog")
     assert (result.exit_code, "commom" in result.stderr) == (2, True)
+
+    engine.answers["a.tlog"] = DialectError("no such dialect")
+    assert run("check", "a.tlog").exit_code == 2
 
     def refuse(_directories: object) -> None:
         raise RuleFileError("mine.toml: detect.flag: column 3: unknown name")

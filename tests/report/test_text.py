@@ -11,6 +11,7 @@ from mavframecheck.report.text import render
 from tests.report import made_up
 
 PIPED = Context("0.1.0")
+DOCS = Path(__file__).parents[2] / "docs" / "output.md"
 GOLDEN = Path(__file__).with_name("flight.txt")
 
 
@@ -27,6 +28,12 @@ def last_line(*results: Checked, context: Context = PIPED) -> str:
 def test_flight_reads_as_agreed() -> None:
     """`tests/report/flight.txt` is what was agreed on: look at it when this fails."""
     assert shown(made_up.flight()) == GOLDEN.read_text(encoding="utf-8")
+
+
+def test_documentation_shows_real_output() -> None:
+    """The sample in docs/output.md is a part of the golden file."""
+    sample = DOCS.read_text(encoding="utf-8").split("```\n")[1]
+    assert sample in GOLDEN.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("verbose", [False, True])
