@@ -283,7 +283,8 @@ class DuplicatedTraffic(Check):
         key |= (frames.seq[rows].astype(np.int64) << 24) | (frames.msgid[rows] & 0xFFFFFF)
         keys = np.concatenate((self._recent, key))
         numbers = np.concatenate((self._recent_number, frames.number[rows]))
-        order = np.argsort(keys, kind="stable")
+        order = _suspects(keys)
+        order = order[np.argsort(keys[order], kind="stable")]
         same = (np.diff(keys[order]) == 0) & (np.diff(numbers[order]) <= self.params["window"])
         again = order[1:][same]
         repeated = np.zeros(len(frames), np.bool_)
@@ -310,6 +311,16 @@ class DuplicatedTraffic(Check):
     def verdict(self) -> Verdict:
         """Return the frames looked at."""
         return Verdict(sum(self._frames.values()))
+
+
+def _suspects(keys: Ints) -> Ints:
+    """Return the places of all keys that may occur twice: those that share a slot of a hash table."""
+    slot = (keys ^ keys >> 20 ^ keys >> 37) & (2**20 - 1)
+    owner = np.zeros(2**20, np.int32)
+    owner[slot] = np.arange(len(keys), dtype=np.int32)
+    shared = np.zeros(2**20, np.bool_)
+    shared[slot[owner[slot] != np.arange(len(keys))]] = True
+    return np.flatnonzero(shared[slot])
 
 
 MAX_COUNTERS = 256

@@ -14,7 +14,7 @@ from mavframecheck.model import Damage, FileReport, Finding, Vehicle
 from mavframecheck.semantics.names import type_name
 from mavframecheck.sources import Recording, open_recording
 from mavframecheck.vehicle import Context, Traffic
-from mavframecheck.vehicle.roles import role_table, version_text
+from mavframecheck.vehicle.roles import role_from_ids, version_text
 from mavframecheck.wire import Batch, Dialect, load_dialect, read_batches
 
 MAX_DAMAGE = 100
@@ -133,7 +133,7 @@ def _vehicles(context: Context, traffic: Traffic) -> list[Vehicle]:
 
 def _vehicle(context: Context, sysid: int, compid: int, messages: int) -> Vehicle:
     sender = sysid * 256 + compid
-    role = str(context.last("roles", "role", sender, role_table()[sender]))
+    role = str(context.last("roles", "role", sender, role_from_ids(sysid, compid)))
     if role != "autopilot":
         return Vehicle(sysid=sysid, compid=compid, role=role, messages=messages)
     mav_type = float(context.last("identity", "type", sysid, np.nan))

@@ -37,6 +37,10 @@ class CompiledRule:
         self.rule = rule
         self.params = {**rule.params, **params}
         self._source = source
+        self.messages = Choice(rule.applies.message)
+        self.criteria = [(name, Choice(value)) for name, value in rule.applies.tag.items()]
+        self.senders = Choice(rule.applies.sender)
+        self.autopilots = Choice(rule.applies.autopilot)
         names = frozenset(self.params) | OWN_NAMES
         self.lets: dict[str, Expression] = {}
         for name, code in rule.let.items():
@@ -141,7 +145,7 @@ def bind(rule: CompiledRule, message: str) -> tuple[Binding, ...]:
     applies = rule.rule.applies
     if rule.rule.detect.check:
         return ()
-    if applies.message and not chosen(message, applies.message):
+    if not rule.messages.allows(message):
         return ()
     if not applies.tag:
         conditions = tuple(_row_conditions(rule.rule, message, None))
@@ -150,9 +154,8 @@ def bind(rule: CompiledRule, message: str) -> tuple[Binding, ...]:
 
 
 def _bind_tags(rule: CompiledRule, message: str) -> Iterator[Binding]:
-    wanted = rule.rule.applies.tag
     for tag in catalogue.tags(message):
-        if not all(_criterion(getattr(tag, name), value) for name, value in wanted.items()):
+        if not all(choice.allows(str(getattr(tag, name))) for name, choice in rule.criteria):
             continue
         partners = catalogue.partners(tag)
         if all(name in partners for name in rule.rule.applies.has):
@@ -160,17 +163,19 @@ def _bind_tags(rule: CompiledRule, message: str) -> Iterator[Binding]:
             yield Binding(rule, message, tag, partners, conditions)
 
 
-def _criterion(have: object, wanted: object) -> bool:
-    if isinstance(wanted, (list, tuple)):
-        return chosen(str(have), tuple(str(w) for w in wanted))
-    return chosen(str(have), (str(wanted),))
+class Choice:
+    """A list in a rule file: any of its values; those with a leading ``!`` exclude."""
 
+    def __init__(self, values: object) -> None:
+        """Take one value or several."""
+        several = values if isinstance(values, (list, tuple)) else (values,)
+        words = [str(value) for value in several]
+        self._excluded = frozenset(word[1:] for word in words if word.startswith("!"))
+        self._included = frozenset(word for word in words if not word.startswith("!"))
 
-def chosen(value: str, choices: tuple[str, ...]) -> bool:
-    """Return whether `value` is among `choices`; those with a leading ``!`` exclude."""
-    excluded = {choice[1:] for choice in choices if choice.startswith("!")}
-    included = {choice for choice in choices if not choice.startswith("!")}
-    return value not in excluded and (not included or value in included)
+    def allows(self, value: str) -> bool:
+        """Return whether `value` is among the values."""
+        return value not in self._excluded and (not self._included or value in self._included)
 
 
 def _row_conditions(rule: Rule, message: str, tag: FieldTag | None) -> Iterator[Condition]:

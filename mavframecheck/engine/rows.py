@@ -44,10 +44,7 @@ class Rows:
     def take(self, rows: Ints | Bools) -> Rows:
         """Return some of the rows."""
         taken = Rows(self.table.take(rows), self.source)
-        taken.known = {
-            name: Known(column.values[rows], column.known[rows])
-            for name, column in self.known.items()
-        }
+        taken.known = {name: column.take(rows) for name, column in self.known.items()}
         return taken
 
     def compact(self) -> Rows:
@@ -69,9 +66,7 @@ class Rows:
             old = self.known.get(name)
             if old is None or not old.known.all():
                 new = self.source.lookup(name, self.table)
-                if old is not None:
-                    new = Known(np.where(old.known, old.values, new.values), old.known | new.known)
-                self.known[name] = new
+                self.known[name] = new if old is None else old.completed(new)
 
     def complete(self, names: Iterable[str]) -> Bools:
         """Return (n,) rows of which all context columns called `names` are known."""
@@ -182,7 +177,9 @@ def join(parts: Sequence[Rows]) -> Rows:
     for name in names:
         columns = [part.known[name] for part in parts]
         joined.known[name] = Known(
-            np.concatenate([c.values for c in columns]), np.concatenate([c.known for c in columns])
+            np.concatenate([c.values for c in columns]),
+            np.concatenate([c.known for c in columns]),
+            columns[0].labels,
         )
     return joined
 

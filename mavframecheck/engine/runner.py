@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mavframecheck.checks import Check, Observation, load_check
-from mavframecheck.engine.compiled import Binding, CompiledRule, bind, chosen
+from mavframecheck.engine.compiled import Binding, Choice, CompiledRule, bind
 from mavframecheck.engine.episodes import Bools, Episode, Episodes, Judged, Mark, Words
 from mavframecheck.engine.rows import Rows
 from mavframecheck.engine.scope import RuleScope, ValueScope
@@ -208,7 +208,7 @@ def _concerns(rule: CompiledRule, binding: Binding, rows: Rows) -> Bools:
     for condition in binding.conditions:
         concerned &= np.isin(rows.raw(condition.field), condition.values)
     if rule.rule.applies.sender:
-        concerned &= _among(rows, "sender.role", rule.rule.applies.sender)
+        concerned &= _among(rows, "sender.role", rule.senders)
     return concerned
 
 
@@ -216,20 +216,14 @@ def _applies(rule: CompiledRule, binding: Binding, rows: Rows) -> Bools:
     """Return (n,) rows that a binding judges."""
     concerned = _concerns(rule, binding, rows)
     if rule.rule.applies.autopilot:
-        concerned &= _among(rows, "vehicle.autopilot", rule.rule.applies.autopilot)
+        concerned &= _among(rows, "vehicle.autopilot", rule.autopilots)
     return concerned
 
 
-def _among(rows: Rows, name: str, choices: tuple[str, ...]) -> Bools:
-    """Return (n,) rows whose context text is among `choices`."""
-
-    def compute() -> Bools:
-        values = rows.context(name).values
-        kinds, which = np.unique(values, return_inverse=True)
-        return np.array([chosen(kind, choices) for kind in kinds.tolist()], np.bool_)[which]
-
-    found: Bools = rows.cached(("among", name, choices), compute)
-    return found
+def _among(rows: Rows, name: str, choice: Choice) -> Bools:
+    """Return (n,) rows whose context word is among those of `choice`."""
+    column = rows.context(name)
+    return column.among(choice.allows)
 
 
 def _streams(rows: Rows) -> np.typing.NDArray[np.int64]:

@@ -52,7 +52,7 @@ class RuleScope:
 
     def context(self, name: str) -> Any:
         """Return the values of a context column."""
-        return self.rows.context(name).values
+        return self.rows.context(name).words
 
     def _refuse(self, problem: str) -> NoReturn:
         message = f"rule {self.binding.rule.rule.code}: {problem}"

@@ -7,6 +7,7 @@ the row is about, `sender.*` of the component that sent it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,6 +43,30 @@ class Known(NamedTuple):
 
     values: Values
     known: Bools
+    labels: tuple[str, ...] = ()
+    """Texts that the values are places in, for a column of words; the first one is ``unknown``."""
+
+    @property
+    def words(self) -> Values:
+        """The values as they are compared and shown: texts for a column of words."""
+        return np.array(self.labels)[self.values] if self.labels else self.values
+
+    def among(self, chosen: Callable[[str], bool]) -> Bools:
+        """Return (n,) rows of a column of words whose word is `chosen`."""
+        return np.array([chosen(label) for label in self.labels])[self.values]
+
+    def take(self, rows: Ints | Bools) -> Known:
+        """Return the column for some of the rows."""
+        return Known(self.values[rows], self.known[rows], self.labels)
+
+    def completed(self, later: Known) -> Known:
+        """Return the column with what is unknown taken from `later`."""
+        values = np.where(self.known, self.values, later.values)
+        return Known(values, self.known | later.known, self.labels)
+
+
+LABELS = {"role": roles.ROLES, "family": roles.FAMILIES}
+"""Quantities that are words: histories keep places in these."""
 
 
 class Context:
@@ -51,8 +76,8 @@ class Context:
         """Start knowing nothing; `autopilot` is the family to assume where no heartbeat tells one."""
         self._assumed = autopilot
         self.histories = {
-            "roles": History(role=np.str_("unknown")),
-            "identity": History(family=np.str_("unknown"), type=np.nan),
+            "roles": History(role=0),
+            "identity": History(family=0, type=np.nan),
             "versions": History(version=np.nan),
             "position": History(lat=np.nan, lon=np.nan, alt_msl=np.nan, relative_alt=np.nan),
             "home": History(lat=np.nan, lon=np.nan, alt_msl=np.nan),
@@ -75,14 +100,15 @@ class Context:
         """Return the context column `name` for the rows of `table`."""
         where, quantity = CONTEXT_NAMES[name]
         if where == "roles":
-            return Known(self._roles(table), np.ones(len(table), np.bool_))
+            return Known(self._roles(table), np.ones(len(table), np.bool_), roles.ROLES)
         history = self.histories[where]
         assumed = self._assumed if name == "vehicle.autopilot" else None
         answer = history.ask(self._asked(self.about(table), table), late=assumed is None)
         values = history.values(quantity, answer)
         if assumed is not None:
-            return Known(np.where(answer.found, values, assumed), np.ones(len(table), np.bool_))
-        return Known(values, answer.found)
+            values = np.where(answer.found, values, roles.FAMILIES.index(assumed))
+            return Known(values, np.ones(len(table), np.bool_), roles.FAMILIES)
+        return Known(values, answer.found, LABELS.get(quantity, ()))
 
     @staticmethod
     def _asked(key: Ints, table: Table) -> Asked:
@@ -98,7 +124,9 @@ class Context:
     def last(self, history: str, quantity: str, key: int, otherwise: Any) -> Any:
         """Return the last value of a quantity for one system or sender, `otherwise` when none was said."""
         found = self.histories[history].last(quantity, key)
-        return otherwise if found is None else found
+        if found is None:
+            return otherwise
+        return LABELS[quantity][int(found)] if quantity in LABELS else found
 
     def about(self, table: Table) -> Ints:
         """Return (n,) the system each row is about, negative where it is not known.
@@ -107,7 +135,7 @@ class Context:
         that has an autopilot; else the only system with one.
         """
         sysid = table.frames.sysid.astype(np.int64)
-        own = self._roles(table) == "autopilot"
+        own = self._roles(table) == roles.ROLES.index("autopilot")
         about = np.where(own, sysid, self._autopilot_for(sysid, table.frames.number))
         if "target_system" in table.layout.by_name:
             target = table["target_system"].astype(np.int64)
@@ -144,16 +172,17 @@ def _learn_heartbeats(context: Context, table: Table) -> None:
         table["type"].astype(np.int64) * 256 + table["autopilot"].astype(np.int64),
         return_inverse=True,
     )
-    role = np.array([roles.role_from_heartbeat(k >> 8, k & 0xFF) for k in kinds.tolist()])[which]
+    names = [roles.role_from_heartbeat(k >> 8, k & 0xFF) for k in kinds.tolist()]
+    role = np.array([roles.ROLES.index(name) for name in names])[which]
     context.histories["roles"].extend(
         table.frames.sender, table.frames, table.frames.number, role=role
     )
-    autopilot = table.take(role == "autopilot")
+    speaks = role == roles.ROLES.index("autopilot")
+    autopilot = table.take(speaks)
     if not len(autopilot):
         return
-    families = np.array([family(k & 0xFF, k >> 8) for k in kinds.tolist()])[which][
-        role == "autopilot"
-    ]
+    named = [family(k & 0xFF, k >> 8) for k in kinds.tolist()]
+    families = np.array([roles.FAMILIES.index(name) for name in named])[which][speaks]
     sysid = autopilot.frames.sysid.astype(np.int64)
     first = np.unique(sysid, return_index=True)[1]
     context.note_autopilots(sysid[first], autopilot.frames.number[first])
@@ -208,7 +237,7 @@ def _learn_home(context: Context, table: Table) -> None:
 
 
 def _from_autopilot(context: Context, table: Table) -> Bools:
-    return np.asarray(context.lookup("sender.role", table).values == "autopilot")
+    return context.lookup("sender.role", table).among("autopilot".__eq__)
 
 
 def _extend(context: Context, name: str, table: Table, rows: Bools, **values: Values) -> None:

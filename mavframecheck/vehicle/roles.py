@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import functools
 import re
+from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.semantics.constants import constant
+from mavframecheck.semantics.names import Family
 
-ROLES = ("autopilot", "gcs", "companion", "camera", "gimbal", "adsb", "unknown")
+ROLES = ("unknown", "autopilot", "gcs", "companion", "camera", "gimbal", "adsb")
+FAMILIES = ("unknown", *get_args(Family))
 
 _BY_TYPE = {
     "GCS": "gcs",
@@ -54,9 +57,12 @@ def _roles_by_type() -> dict[int, str]:
 
 
 @functools.cache
-def role_table() -> npt.NDArray[np.str_]:
-    """(65536,) role by convention of each sender (``sysid * 256 + compid``)."""
-    return np.array([role_from_ids(sender >> 8, sender & 0xFF) for sender in range(65536)])
+def role_table() -> npt.NDArray[np.int64]:
+    """(65536,) role by convention of each sender (``sysid * 256 + compid``), as a place in ROLES."""
+    by_component = np.array([ROLES.index(role_from_ids(0, compid)) for compid in range(256)])
+    table = np.tile(by_component, 256)
+    table[_GCS_SYSTEM << 8 :] = ROLES.index("gcs")
+    return table
 
 
 def version_number(major: int, minor: int, patch: int) -> int:
