@@ -14,7 +14,7 @@ from mavframecheck.model import Damage, FileReport, Finding, Vehicle
 from mavframecheck.semantics.names import type_name
 from mavframecheck.sources import Recording, open_recording
 from mavframecheck.vehicle import Context, Traffic
-from mavframecheck.vehicle.roles import role_from_ids, version_text
+from mavframecheck.vehicle.roles import version_text
 from mavframecheck.wire import Batch, Dialect, load_dialect, read_batches
 
 MAX_DAMAGE = 100
@@ -132,18 +132,16 @@ def _vehicles(context: Context, traffic: Traffic) -> list[Vehicle]:
 
 
 def _vehicle(context: Context, sysid: int, compid: int, messages: int) -> Vehicle:
-    sender = sysid * 256 + compid
-    role = str(context.last("roles", "role", sender, role_from_ids(sysid, compid)))
+    role = context.role(sysid * 256 + compid)
     if role != "autopilot":
         return Vehicle(sysid=sysid, compid=compid, role=role, messages=messages)
-    mav_type = float(context.last("identity", "type", sysid, np.nan))
-    family = str(context.last("identity", "family", sysid, "unknown"))
+    mav_type = context.last("vehicle.type", sysid)
     return Vehicle(
         sysid=sysid,
         compid=compid,
         role=role,
-        autopilot=None if family == "unknown" else family,
-        type=None if np.isnan(mav_type) else type_name(int(mav_type)),
-        version=version_text(float(context.last("versions", "version", sysid, np.nan))),
+        autopilot=context.last("vehicle.autopilot", sysid),
+        type=None if mav_type is None else type_name(int(mav_type)),
+        version=version_text(context.last("vehicle.version", sysid)),
         messages=messages,
     )

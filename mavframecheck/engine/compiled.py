@@ -17,7 +17,7 @@ from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.enums import FrameKind, Quantity
 from mavframecheck.semantics.mavframe import frames_of
 from mavframecheck.semantics.tags import Condition, FieldTag
-from mavframecheck.vehicle.context import source_of
+from mavframecheck.vehicle import NAMES
 
 OWN_NAMES = frozenset({"message", "field"})
 """Names that every rule knows: the message and the field that it is looking at."""
@@ -70,8 +70,11 @@ class CompiledRule:
         """
         found = {"vehicle.autopilot"} if self.rule.applies.autopilot else set()
         found = found.union(*map(self._contexts, (self.when, self.flag)))
-        tested = {source_of(name) for name in (self.when.tested if self.when is not None else ())}
-        return frozenset(n for n in found - ALWAYS_KNOWN if source_of(n) not in tested)
+        tested = [
+            NAMES[name].sources for name in (self.when.tested if self.when is not None else ())
+        ]
+        together = {history for sources in tested for history, _ in sources}
+        return frozenset(n for n in found - ALWAYS_KNOWN if NAMES[n].sources[0][0] not in together)
 
     @property
     def judged_by(self) -> frozenset[str]:

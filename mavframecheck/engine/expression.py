@@ -15,7 +15,7 @@ import numpy as np
 
 from mavframecheck.engine.functions import FIELD_FUNCTIONS, FUNCTIONS
 from mavframecheck.semantics.constants import constant
-from mavframecheck.vehicle import CONTEXT_NAMES
+from mavframecheck.vehicle import NAMES
 
 MAX_LENGTH = 2000
 MAX_DEPTH = 60
@@ -123,7 +123,7 @@ class Expression:
                 node, "a dotted name has two parts, as in home.alt_msl or MAV_FRAME.LOCAL_NED"
             )
         name = f"{node.value.id}.{node.attr}"
-        if name in CONTEXT_NAMES:
+        if name in NAMES:
             self.contexts.add(name)
             return lambda scope: scope.context(name)
         if node.value.id.isupper() or node.value.id.replace("_", "").isupper():
@@ -132,7 +132,7 @@ class Expression:
             except KeyError as error:
                 raise _error(node, str(error.args[0])) from error
             return lambda _scope: value
-        raise _error(node, f"unknown context {name!r}: one of {', '.join(sorted(CONTEXT_NAMES))}")
+        raise _error(node, f"unknown context {name!r}: one of {', '.join(sorted(NAMES))}")
 
     def _binary(self, node: ast.BinOp) -> Evaluate:
         operator = _BINARY.get(type(node.op))

@@ -16,8 +16,7 @@ from mavframecheck.engine.template import Template, first_value, plain
 from mavframecheck.engine.waiting import Queue
 from mavframecheck.model import Evidence, Finding, RuleRun, Scalar, Severity, Subject
 from mavframecheck.semantics import catalogue
-from mavframecheck.vehicle import Context
-from mavframecheck.vehicle.context import MISSING
+from mavframecheck.vehicle import NAMES, Context
 from mavframecheck.wire import Batch, Dialect
 
 
@@ -37,6 +36,7 @@ class _Desk:
     """The bindings on one message that need the same context, and the rows that wait for it."""
 
     queue: Queue
+    senders: Choice
     rules: list[tuple[CompiledRule, str | None, list[Binding]]]
 
 
@@ -88,19 +88,23 @@ class Runner:
     def _desks_for(self, message: str) -> list[_Desk]:
         """Bind every rule to a message that is seen for the first time."""
         if message not in self._desks:
-            desks: dict[tuple[str, ...], _Desk] = {}
+            desks: dict[tuple[tuple[str, ...], ...], _Desk] = {}
             for rule in self._rules:
                 labelled: dict[str | None, list[Binding]] = {}
                 for binding in bind(rule, message):
                     labelled.setdefault(binding.label, []).append(binding)
                 if labelled:
-                    names = tuple(sorted(rule.awaited))
-                    desk = desks.setdefault(names, _Desk(Queue(names), []))
+                    names, senders = tuple(sorted(rule.awaited)), rule.rule.applies.sender
+                    desk = desks.setdefault((names, senders), _Desk(Queue(names), rule.senders, []))
                     desk.rules += [(rule, label, bindings) for label, bindings in labelled.items()]
             self._desks[message] = list(desks.values())
         return self._desks[message]
 
     def _serve(self, desk: _Desk, rows: Rows | None, batch: Batch) -> None:
+        if rows is not None:
+            speaks = _among(rows, "sender.role", desk.senders)
+            if not speaks.all():
+                rows = rows.take(speaks)
         if desk.queue.names:
             released = desk.queue.offer(rows, batch.frames)
             self._judge_late(desk, released.late)
@@ -184,7 +188,7 @@ class Runner:
                 looked[decidable] = self._judge(rule, label, bindings, rows.take(decidable))
             stuck = ~looked & ~rows.complete(rule.judged_by)
             if stuck.any():
-                concerned = stuck & np.any([_concerns(rule, b, rows) for b in bindings], axis=0)
+                concerned = stuck & np.any([_concerns(b, rows) for b in bindings], axis=0)
                 tally = self._tallies[rule.rule.code]
                 tally.late += int(concerned.sum())
                 tally.missing |= {
@@ -193,7 +197,7 @@ class Runner:
 
     def _run_of(self, rule: CompiledRule) -> RuleRun:
         code, tally = rule.rule.code, self._tallies[rule.rule.code]
-        why = "; ".join(sorted({MISSING[name] for name in tally.missing}))
+        why = "; ".join(sorted({NAMES[name].missing for name in tally.missing}))
         if tally.checked:
             reason = f"{tally.late} rows not judged: {why}" if tally.late else ""
             return RuleRun(code=code, status="ran", checked=tally.checked, reason=reason)
@@ -202,19 +206,17 @@ class Runner:
         return RuleRun(code=code, status="not-applicable", reason=_what_was_missing(rule))
 
 
-def _concerns(rule: CompiledRule, binding: Binding, rows: Rows) -> Bools:
+def _concerns(binding: Binding, rows: Rows) -> Bools:
     """Return (n,) rows that a binding is about, as far as the message itself tells."""
     concerned = np.ones(len(rows), np.bool_)
     for condition in binding.conditions:
         concerned &= np.isin(rows.raw(condition.field), condition.values)
-    if rule.rule.applies.sender:
-        concerned &= _among(rows, "sender.role", rule.senders)
     return concerned
 
 
 def _applies(rule: CompiledRule, binding: Binding, rows: Rows) -> Bools:
     """Return (n,) rows that a binding judges."""
-    concerned = _concerns(rule, binding, rows)
+    concerned = _concerns(binding, rows)
     if rule.rule.applies.autopilot:
         concerned &= _among(rows, "vehicle.autopilot", rule.autopilots)
     return concerned

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mavframecheck.engine.rows import Rows, join
+from mavframecheck.vehicle import NAMES
 from mavframecheck.vehicle.history import LATE_FRAMES, LATE_US
 from mavframecheck.wire import Frames
 
@@ -24,6 +25,7 @@ class Queue:
     def __init__(self, names: tuple[str, ...]) -> None:
         """Wait for the context columns called `names`."""
         self.names = names
+        self._patience_us = max((_patience_us(name) for name in names), default=0)
         self._waiting: Rows | None = None
 
     def offer(self, rows: Rows | None, now: Frames) -> Released:
@@ -40,7 +42,7 @@ class Queue:
         complete = both.complete(self.names)
         if complete.all():
             return Released(both, None)
-        late = ~complete & _too_old(both, now)
+        late = ~complete & _too_old(both, now, self._patience_us)
         keep = ~complete & ~late
         if keep.any():
             self._waiting = both.take(keep).compact()
@@ -52,7 +54,13 @@ class Queue:
         return waiting
 
 
-def _too_old(rows: Rows, now: Frames) -> np.typing.NDArray[np.bool_]:
+def _patience_us(name: str) -> int:
+    """Return how long a row waits for a context name, us."""
+    entry = NAMES[name]
+    return (entry.max_age_us or 0) if entry.after else LATE_US
+
+
+def _too_old(rows: Rows, now: Frames, patience_us: int) -> np.typing.NDArray[np.bool_]:
     """Return (n,) rows for which a value said after `now` would come too late."""
     if not len(now):
         return np.zeros(len(rows), np.bool_)
@@ -60,5 +68,5 @@ def _too_old(rows: Rows, now: Frames) -> np.typing.NDArray[np.bool_]:
     old = now.number[-1] - frames.number > LATE_FRAMES
     timed = np.flatnonzero(now.t_valid)
     if len(timed):
-        old |= frames.t_valid & (now.t_us[timed[-1]] - frames.t_us > LATE_US)
+        old |= frames.t_valid & (now.t_us[timed[-1]] - frames.t_us > patience_us)
     return np.asarray(old)

@@ -1,8 +1,8 @@
 """The context that rules see: as-of columns of what each vehicle and sender has said.
 
 A row takes the last value said before it (in frame order), else the first one said soon after it; what
-never comes is unknown. Names are `<subject>.<quantity>`: `vehicle.*`, `home.*` speak of the system that
-the row is about, `sender.*` of the component that sent it.
+never comes is unknown. `facts` lists the names; those of a vehicle speak of the system that the row is
+about, those of a sender of the component that sent it.
 """
 
 from __future__ import annotations
@@ -12,30 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mavframecheck.semantics.names import family
-from mavframecheck.vehicle import roles
-from mavframecheck.vehicle.history import Asked, Bools, History, Ints, Values
+from mavframecheck.vehicle.facts import NAMES, SOURCES, WORDS, Name, Source, histories
+from mavframecheck.vehicle.history import Answer, Asked, Bools, History, Ints, Values
+from mavframecheck.vehicle.roles import ROLES, RoleBook
 from mavframecheck.wire import Batch, Table
 
-CONTEXT_NAMES: dict[str, tuple[str, str]] = {
-    "sender.role": ("roles", "role"),
-    "vehicle.autopilot": ("identity", "family"),
-    "vehicle.type": ("identity", "type"),
-    "vehicle.version": ("versions", "version"),
-    "vehicle.lat": ("position", "lat"),
-    "vehicle.lon": ("position", "lon"),
-    "vehicle.alt_msl": ("position", "alt_msl"),
-    "vehicle.relative_alt": ("position", "relative_alt"),
-    "home.lat": ("home", "lat"),
-    "home.lon": ("home", "lon"),
-    "home.alt_msl": ("home", "alt_msl"),
-}
-"""Name in an expression -> (history, quantity in it)."""
-
-
-def source_of(name: str) -> str:
-    """Return which history a context name is read from: names of one history come together."""
-    return CONTEXT_NAMES[name][0]
+MAX_WORDS = 2000
+"""Different texts of one quantity that are kept apart."""
+UNKNOWN = "unknown"
 
 
 class Known(NamedTuple):
@@ -62,11 +46,7 @@ class Known(NamedTuple):
     def completed(self, later: Known) -> Known:
         """Return the column with what is unknown taken from `later`."""
         values = np.where(self.known, self.values, later.values)
-        return Known(values, self.known | later.known, self.labels)
-
-
-LABELS = {"role": roles.ROLES, "family": roles.FAMILIES}
-"""Quantities that are words: histories keep places in these."""
+        return Known(values, self.known | later.known, later.labels)
 
 
 class Context:
@@ -75,58 +55,122 @@ class Context:
     def __init__(self, autopilot: str | None = None) -> None:
         """Start knowing nothing; `autopilot` is the family to assume where no heartbeat tells one."""
         self._assumed = autopilot
-        self.histories = {
-            "roles": History(role=0),
-            "identity": History(family=0, type=np.nan),
-            "versions": History(version=np.nan),
-            "position": History(lat=np.nan, lon=np.nan, alt_msl=np.nan, relative_alt=np.nan),
-            "home": History(lat=np.nan, lon=np.nan, alt_msl=np.nan),
-        }
-        self._autopilots: dict[int, int] = {}
-        """System id -> running number of the first heartbeat of its autopilot."""
+        self._roles = RoleBook()
+        self._histories = {name: History(quantities) for name, quantities in histories().items()}
+        self._words: dict[str, dict[str, int]] = {name: {UNKNOWN: 0} for name in WORDS}
+        self._batch: Batch | None = None
+        self._fed: set[str] = set()
 
     def update(self, batch: Batch) -> None:
         """Take in what `batch` says. Call `settle` once every rule has read it."""
-        for message, learn in _LEARNERS.items():
-            if message in batch.tables:
-                learn(self, batch.tables[message])
+        self._batch = batch
+        self._fed.clear()
+        if "HEARTBEAT" in batch.tables:
+            self._roles.update(batch.tables["HEARTBEAT"])
 
     def settle(self) -> None:
         """Forget what only rows of the current batch could ask for."""
-        for history in self.histories.values():
+        for name, history in self._histories.items():
+            if name not in self._fed:
+                self._feed(name, only_last=True)
             history.settle()
+        self._roles.settle()
+        self._batch = None
 
     def lookup(self, name: str, table: Table) -> Known:
-        """Return the context column `name` for the rows of `table`."""
-        where, quantity = CONTEXT_NAMES[name]
-        if where == "roles":
-            return Known(self._roles(table), np.ones(len(table), np.bool_), roles.ROLES)
-        history = self.histories[where]
-        assumed = self._assumed if name == "vehicle.autopilot" else None
-        answer = history.ask(self._asked(self.about(table), table), late=assumed is None)
-        values = history.values(quantity, answer)
-        if assumed is not None:
-            values = np.where(answer.found, values, roles.FAMILIES.index(assumed))
-            return Known(values, np.ones(len(table), np.bool_), roles.FAMILIES)
-        return Known(values, answer.found, LABELS.get(quantity, ()))
+        """Return the context column `name` for the rows of `table`; KeyError for an unknown name."""
+        entry = NAMES[name]
+        if entry.key == "sender":
+            return Known(self._roles.of(table), np.ones(len(table), np.bool_), ROLES)
+        asked = self._asked(entry, table)
+        answers = [(self._ready(h), q, self._answer(entry, h, asked)) for h, q in entry.sources]
+        values, known = np.full(len(table), np.nan), np.zeros(len(table), np.bool_)
+        earliest = np.min([answer.number for _, _, answer in answers], axis=0)
+        for history, quantity, answer in answers:
+            said_before = answer.found & (answer.number < asked.number)
+            take = ~known & answer.found & (said_before | (answer.number == earliest))
+            values = np.where(take, history.values(quantity, answer), values)
+            known |= take
+        return self._column(name, entry, values, known)
 
-    @staticmethod
-    def _asked(key: Ints, table: Table) -> Asked:
+    def _column(self, name: str, entry: Name, values: Values, known: Bools) -> Known:
+        """Return numbers as they are; words as places in their list of texts."""
+        quantity = entry.sources[0][1]
+        if quantity not in WORDS:
+            return Known(values, known & ~np.isnan(values))
+        words = self._words[quantity]
+        places = np.nan_to_num(values).astype(np.int64)
+        if name == "vehicle.autopilot" and self._assumed is not None:
+            places = np.where(known, places, words.setdefault(self._assumed, len(words)))
+            known = np.ones(len(known), np.bool_)
+        return Known(places, known, tuple(words))
+
+    def _asked(self, entry: Name, table: Table) -> Asked:
+        key = self.about(table)
+        if entry.key == "command":
+            commanded = "command" in table.layout.by_name
+            command = table["command"].astype(np.int64) if commanded else np.full(len(key), -1)
+            key = np.where((key >= 0) & (command >= 0), key << 16 | command, -1)
         return Asked(key, table.frames.number, table.frames.t_us, table.frames.t_valid)
 
-    def _roles(self, table: Table) -> Values:
-        """Return (n,) the role of each sender by its heartbeats so far, else by the convention of ids."""
-        sender = table.frames.sender
-        answer = self.histories["roles"].ask(self._asked(sender, table), late=False)
-        said = self.histories["roles"].values("role", answer)
-        return np.where(answer.found, said, roles.role_table()[sender])
+    def _answer(self, entry: Name, history: str, asked: Asked) -> Answer:
+        """Find the value before each row, else the first one soon after it (an answer: only that)."""
+        kept = self._ready(history)
+        if entry.after:
+            return kept.after(asked, entry.max_age_us or 0)
+        before = kept.before(asked, entry.max_age_us)
+        if before.found.all() or (self._assumed is not None and history == "identity"):
+            return before
+        after = kept.after(asked)
+        return Answer(*(np.where(before.found, b, a) for b, a in zip(before, after, strict=True)))
 
-    def last(self, history: str, quantity: str, key: int, otherwise: Any) -> Any:
-        """Return the last value of a quantity for one system or sender, `otherwise` when none was said."""
-        found = self.histories[history].last(quantity, key)
-        if found is None:
-            return otherwise
-        return LABELS[quantity][int(found)] if quantity in LABELS else found
+    def _ready(self, name: str) -> History:
+        """Return a history with all that the current batch says."""
+        if name not in self._fed:
+            self._fed.add(name)
+            self._feed(name, only_last=False)
+        return self._histories[name]
+
+    def _feed(self, name: str, *, only_last: bool) -> None:
+        """Add what the current batch says to a history: every row, or the last one of each system."""
+        for source in _SOURCES_OF[name]:
+            table = self._batch.tables.get(source.message) if self._batch is not None else None
+            if table is not None:
+                rows = self._rows(source, table)
+                kept = table.take(_last_of_each(_keys(source, table), rows) if only_last else rows)
+                if len(kept):
+                    values = {q: self._numbers(q, read(kept)) for q, read in source.reads.items()}
+                    self._histories[name].extend(_keys(source, kept), kept.frames, values)
+
+    def _rows(self, source: Source, table: Table) -> Ints:
+        """Return the rows of a table in which an autopilot says something."""
+        speaks = self._roles.of(table) == ROLES.index("autopilot")
+        return np.flatnonzero(speaks if source.valid is None else speaks & source.valid(table))
+
+    def _numbers(self, quantity: str, values: Values) -> Values:
+        """Return a column as numbers; words as places in their list of texts."""
+        if quantity not in WORDS:
+            return values.astype(np.float64)
+        words = self._words[quantity]
+        kinds, which = np.unique(values, return_inverse=True)
+        places = []
+        for kind in kinds.tolist():
+            text = kind.decode("utf-8", "replace") if isinstance(kind, bytes) else kind
+            full = len(words) >= MAX_WORDS and text not in words
+            places.append(0 if full else words.setdefault(text, len(words)))
+        return np.array(places, np.float64)[which]
+
+    def last(self, name: str, system: int) -> Any:
+        """Return the last value of a context name for one system, None when it is unknown."""
+        history, quantity = NAMES[name].sources[0]
+        value = self._histories[history].last(quantity, system)
+        if value is None or np.isnan(value):
+            return None
+        return list(self._words[quantity])[int(value)] if quantity in WORDS else value
+
+    def role(self, sender: int) -> str:
+        """Return the role that a sender has by its last heartbeat, else by the convention of ids."""
+        return ROLES[self._roles.last(sender)]
 
     def about(self, table: Table) -> Ints:
         """Return (n,) the system each row is about, negative where it is not known.
@@ -135,141 +179,27 @@ class Context:
         that has an autopilot; else the only system with one.
         """
         sysid = table.frames.sysid.astype(np.int64)
-        own = self._roles(table) == roles.ROLES.index("autopilot")
-        about = np.where(own, sysid, self._autopilot_for(sysid, table.frames.number))
+        own = self._roles.of(table) == ROLES.index("autopilot")
+        if own.all():
+            return sysid
+        about = np.where(own, sysid, self._roles.autopilot_for(sysid, table.frames.number))
         if "target_system" in table.layout.by_name:
             target = table["target_system"].astype(np.int64)
             about = np.where(~own & (target > 0), target, about)
         return about
 
-    def _autopilot_for(self, sysid: Ints, index: Ints) -> Ints:
-        """Return the sender's own system where its autopilot was heard, else the only one heard.
 
-        Where none was heard yet it is the one that is heard first.
-        """
-        if not self._autopilots:
-            return np.full(len(sysid), -1, np.int64)
-        systems = np.array(list(self._autopilots), np.int64)
-        first = np.array(list(self._autopilots.values()), np.int64)
-        heard_from = np.full(256, np.iinfo(np.int64).max)
-        heard_from[systems] = first
-        heard = np.searchsorted(np.sort(first), index, side="right")
-        only = np.where(heard <= 1, systems[np.argmin(first)], -1)
-        return np.where(heard_from[sysid] <= index, sysid, only)
-
-    def autopilots(self) -> tuple[int, ...]:
-        """Return the systems whose autopilot was heard, ascending."""
-        return tuple(sorted(self._autopilots))
-
-    def note_autopilots(self, sysid: Ints, index: Ints) -> None:
-        """Remember when the autopilot of each system was first heard."""
-        for system, number in zip(sysid.tolist(), index.tolist(), strict=True):
-            self._autopilots.setdefault(system, number)
+def _keys(source: Source, table: Table) -> Ints:
+    system = table.frames.sysid.astype(np.int64)
+    return system << 16 | table["command"] if source.key == "command" else system
 
 
-def _learn_heartbeats(context: Context, table: Table) -> None:
-    kinds, which = np.unique(
-        table["type"].astype(np.int64) * 256 + table["autopilot"].astype(np.int64),
-        return_inverse=True,
-    )
-    names = [roles.role_from_heartbeat(k >> 8, k & 0xFF) for k in kinds.tolist()]
-    role = np.array([roles.ROLES.index(name) for name in names])[which]
-    context.histories["roles"].extend(
-        table.frames.sender, table.frames, table.frames.number, role=role
-    )
-    speaks = role == roles.ROLES.index("autopilot")
-    autopilot = table.take(speaks)
-    if not len(autopilot):
-        return
-    named = [family(k & 0xFF, k >> 8) for k in kinds.tolist()]
-    families = np.array([roles.FAMILIES.index(name) for name in named])[which][speaks]
-    sysid = autopilot.frames.sysid.astype(np.int64)
-    first = np.unique(sysid, return_index=True)[1]
-    context.note_autopilots(sysid[first], autopilot.frames.number[first])
-    context.histories["identity"].extend(
-        sysid,
-        autopilot.frames,
-        autopilot.frames.number,
-        family=families,
-        type=autopilot["type"].astype(float),
-    )
+def _last_of_each(keys: Ints, rows: Ints) -> Ints:
+    """Return, of the `rows`, the last one of each key."""
+    backwards = rows[::-1]
+    return backwards[np.sort(np.unique(keys[backwards], return_index=True)[1])][::-1]
 
 
-def _learn_version(context: Context, table: Table) -> None:
-    number = [
-        roles.version_from_flight_sw(raw) or np.nan for raw in table["flight_sw_version"].tolist()
-    ]
-    _extend(context, "versions", table, ~np.isnan(number), version=np.array(number, float))
-
-
-def _learn_banner(context: Context, table: Table) -> None:
-    texts, which = np.unique(table["text"], return_inverse=True)
-    number = np.array(
-        [roles.version_from_banner(text) or np.nan for text in texts.tolist()], float
-    )[which]
-    _extend(context, "versions", table, ~np.isnan(number), version=number)
-
-
-def _learn_position(context: Context, table: Table) -> None:
-    placed = (table["lat"] != 0) | (table["lon"] != 0)
-    _extend(
-        context,
-        "position",
-        table,
-        placed & _from_autopilot(context, table),
-        lat=table["lat"] * 1e-7,
-        lon=table["lon"] * 1e-7,
-        alt_msl=table["alt"] * 1e-3,
-        relative_alt=table["relative_alt"] * 1e-3,
-    )
-
-
-def _learn_home(context: Context, table: Table) -> None:
-    _extend(
-        context,
-        "home",
-        table,
-        _from_autopilot(context, table),
-        lat=table["latitude"] * 1e-7,
-        lon=table["longitude"] * 1e-7,
-        alt_msl=table["altitude"] * 1e-3,
-    )
-
-
-def _from_autopilot(context: Context, table: Table) -> Bools:
-    return context.lookup("sender.role", table).among("autopilot".__eq__)
-
-
-def _extend(context: Context, name: str, table: Table, rows: Bools, **values: Values) -> None:
-    """Add the `rows` of a table that an autopilot sent about itself."""
-    kept = table.take(rows)
-    context.histories[name].extend(
-        kept.frames.sysid.astype(np.int64),
-        kept.frames,
-        kept.frames.number,
-        **{n: v[rows] for n, v in values.items()},
-    )
-
-
-_LEARNERS = {
-    "HEARTBEAT": _learn_heartbeats,
-    "AUTOPILOT_VERSION": _learn_version,
-    "STATUSTEXT": _learn_banner,
-    "GLOBAL_POSITION_INT": _learn_position,
-    "HOME_POSITION": _learn_home,
+_SOURCES_OF: dict[str, list[Source]] = {
+    name: [source for source in SOURCES if source.history == name] for name in histories()
 }
-"""Message -> how it adds to the context; HEARTBEAT comes first because it says who is an autopilot."""
-
-MISSING: dict[str, str] = {
-    "vehicle.autopilot": "no HEARTBEAT of the autopilot says what it is (--autopilot tells)",
-    "vehicle.type": "no HEARTBEAT of the autopilot says what it is",
-    "vehicle.version": "neither AUTOPILOT_VERSION nor a boot banner says the version",
-    "vehicle.lat": "no GLOBAL_POSITION_INT with a position",
-    "vehicle.lon": "no GLOBAL_POSITION_INT with a position",
-    "vehicle.alt_msl": "no GLOBAL_POSITION_INT with a position",
-    "vehicle.relative_alt": "no GLOBAL_POSITION_INT with a position",
-    "home.lat": "no HOME_POSITION",
-    "home.lon": "no HOME_POSITION",
-    "home.alt_msl": "no HOME_POSITION",
-}
-"""Context name -> what the recording lacks when it is unknown, for people."""

@@ -17,14 +17,15 @@ LATE_FRAMES = 20_000
 LATE_US = 60_000_000
 """A value may come this much later than the row it is needed for (frames, and us of receive time)."""
 
-_INDEX_BITS = 44
+_NUMBER_BITS = 38
+_NEVER = np.iinfo(np.int64).max
 
 
 class Asked(NamedTuple):
     """Rows that ask for context: whose (`key`), and when they were sent; all (n,)."""
 
     key: Ints
-    """System or sender; negative where it is not known whom the row is about."""
+    """System, sender, or system and command; negative where it is not known whom the row is about."""
     number: Ints
     """Running number of the frame."""
     t_us: Ints
@@ -32,51 +33,43 @@ class Asked(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Where in a history the answer for each row lies; both (n,)."""
+    """Where in a history the value for each row lies; all (n,)."""
 
     place: Ints
     found: Bools
+    number: Ints
+    """Running number of the frame that said it."""
 
 
 class History:
-    """The values of some quantities per key (a system or a sender), in frame order.
+    """The values of some quantities per key, in frame order.
 
     Holds what the current batch said and, before that, only the last value of each key.
     """
 
-    def __init__(self, **blank: object) -> None:
-        """Name the quantities; each default is what an unknown value reads as (NaN, ``unknown``)."""
-        self._blank = {name: np.asarray(value) for name, value in blank.items()}
+    def __init__(self, quantities: tuple[str, ...]) -> None:
+        """Remember numbers for `quantities`; what was never said reads as NaN."""
         self._order: Ints = np.zeros(0, np.int64)
         self._t_us: Ints = np.zeros(0, np.int64)
         self._t_valid: Bools = np.zeros(0, np.bool_)
-        self._values: dict[str, Values] = {
-            name: blank[:0] for name, blank in self._blanks(1).items()
-        }
+        self._values: dict[str, Values] = {name: np.zeros(0) for name in quantities}
 
-    def _blanks(self, n: int) -> dict[str, Values]:
-        return {name: np.full(n, value) for name, value in self._blank.items()}
-
-    def extend(self, key: Ints, frames: Frames, index: Ints, **values: Values) -> None:
-        """Add rows of a batch: the `key` each is about, its frame and running number, and its values."""
-        if not len(key):
-            return
-        order = np.concatenate((self._order, key << _INDEX_BITS | index))
+    def extend(self, key: Ints, frames: Frames, values: dict[str, Values]) -> None:
+        """Add rows of a batch: the `key` and the frame of each, and its values."""
+        order = np.concatenate((self._order, key << _NUMBER_BITS | frames.number))
         by = np.argsort(order, kind="stable")
         self._order = order[by]
         self._t_us = np.concatenate((self._t_us, frames.t_us))[by]
         self._t_valid = np.concatenate((self._t_valid, frames.t_valid))[by]
         for name, old in self._values.items():
-            self._values[name] = np.concatenate((old, values[name]))[by]
+            new = values.get(name)
+            blank = np.full(len(key), np.nan) if new is None else new
+            self._values[name] = np.concatenate((old, blank))[by]
 
     def settle(self) -> None:
         """Forget all but the last value of each key: the batch is done."""
-        key = self._order >> _INDEX_BITS
-        last = (
-            np.flatnonzero(np.concatenate((key[1:] != key[:-1], [True])))
-            if len(key)
-            else np.zeros(0, np.int64)
-        )
+        key = self._order >> _NUMBER_BITS
+        last = np.flatnonzero(np.diff(key, append=-1))
         self._order, self._t_us, self._t_valid = (
             self._order[last],
             self._t_us[last],
@@ -84,33 +77,50 @@ class History:
         )
         self._values = {name: values[last] for name, values in self._values.items()}
 
-    def ask(self, asked: Asked, *, late: bool = True) -> Answer:
-        """Find, for each row, the last value said before it, else (if `late`) the first one soon after it."""
+    def before(self, asked: Asked, max_age_us: int | None = None) -> Answer:
+        """Find the last value said before each row, no older than `max_age_us`."""
+        wanted = asked.key << _NUMBER_BITS | asked.number
+        place = np.searchsorted(self._order, wanted, side="left") - 1
+        answer = self._answer(asked, place, np.asarray(place >= 0))
+        if max_age_us is None or not len(self._order):
+            return answer
+        return answer._replace(found=answer.found & self._near(asked, answer.place, max_age_us))
+
+    def after(self, asked: Asked, max_delay_us: int = LATE_US) -> Answer:
+        """Find the first value said soon after each row."""
+        wanted = asked.key << _NUMBER_BITS | asked.number
+        place = np.searchsorted(self._order, wanted, side="left")
+        answer = self._answer(asked, place, np.asarray(place < len(self._order)))
         if not len(self._order):
-            return Answer(np.zeros(len(asked.key), np.int64), np.zeros(len(asked.key), np.bool_))
-        wanted = asked.key << _INDEX_BITS | asked.number
-        after = np.searchsorted(self._order, wanted, side="left")
-        before = np.maximum(after - 1, 0)
-        said = (after > 0) & (self._order[before] >> _INDEX_BITS == asked.key)
-        after = np.minimum(after, len(self._order) - 1)
-        soon = (self._order[after] >> _INDEX_BITS == asked.key) & (self._order[after] >= wanted)
-        soon &= self._order[after] - wanted <= LATE_FRAMES
-        timed = self._t_valid[after] & asked.t_valid
-        soon &= ~timed | (np.abs(self._t_us[after] - asked.t_us) <= LATE_US)
-        return Answer(
-            np.where(said, before, after), (said | soon if late else said) & (asked.key >= 0)
+            return answer
+        soon = answer.number - asked.number <= LATE_FRAMES
+        return answer._replace(
+            found=answer.found & soon & self._near(asked, answer.place, max_delay_us)
         )
 
-    def values(self, name: str, answer: Answer) -> Values:
-        """Return the quantity `name` at the places of `answer`, blank where nothing was found."""
-        blank = self._blank[name]
+    def _answer(self, asked: Asked, place: Ints, inside: Bools) -> Answer:
         if not len(self._order):
-            return np.full(len(answer.place), blank)
-        return np.where(answer.found, self._values[name][answer.place], blank)
+            nothing = np.zeros(len(asked.key), np.int64)
+            return Answer(nothing, nothing.astype(np.bool_), nothing + _NEVER)
+        place = np.clip(place, 0, len(self._order) - 1)
+        found = inside & (self._order[place] >> _NUMBER_BITS == asked.key) & (asked.key >= 0)
+        number = self._order[place] & ((1 << _NUMBER_BITS) - 1)
+        return Answer(place, found, np.where(found, number, _NEVER))
 
-    def last(self, name: str, key: int) -> Any:
+    def _near(self, asked: Asked, place: Ints, limit_us: int) -> Bools:
+        """Return (n,) values within `limit_us` of their row; times that cannot be believed count as near."""
+        timed = self._t_valid[place] & asked.t_valid
+        return np.asarray(~timed | (np.abs(self._t_us[place] - asked.t_us) <= limit_us))
+
+    def values(self, name: str, answer: Answer) -> Values:
+        """Return the quantity `name` at the places of `answer`, NaN where nothing was found."""
+        if not len(self._order):
+            return np.full(len(answer.place), np.nan)
+        return np.where(answer.found, self._values[name][answer.place], np.nan)
+
+    def last(self, name: str, key: int) -> float | None:
         """Return the last value of the quantity `name` for one key, None when there is none."""
-        place = int(np.searchsorted(self._order, (key + 1) << _INDEX_BITS)) - 1
-        if place < 0 or self._order[place] >> _INDEX_BITS != key:
+        place = int(np.searchsorted(self._order, (key + 1) << _NUMBER_BITS)) - 1
+        if place < 0 or self._order[place] >> _NUMBER_BITS != key:
             return None
-        return self._values[name][place]
+        return float(self._values[name][place])

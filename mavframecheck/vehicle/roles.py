@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import functools
 import re
-from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.semantics.constants import constant
-from mavframecheck.semantics.names import Family
+from mavframecheck.wire import Table
+
+Ints = npt.NDArray[np.int64]
 
 ROLES = ("unknown", "autopilot", "gcs", "companion", "camera", "gimbal", "adsb")
-FAMILIES = ("unknown", *get_args(Family))
 
 _BY_TYPE = {
     "GCS": "gcs",
@@ -65,14 +65,83 @@ def role_table() -> npt.NDArray[np.int64]:
     return table
 
 
+class RoleBook:
+    """The role of every sender over time, and which systems have an autopilot."""
+
+    def __init__(self) -> None:
+        """Start with the convention of ids."""
+        self._now = role_table().copy()
+        """(65536,) role of each sender before the current batch."""
+        self._later = self._now
+        """The same after it."""
+        self._changes: Table | None = None
+        self._autopilots: dict[int, int] = {}
+        """System -> running number of the first heartbeat of its autopilot."""
+
+    def update(self, heartbeats: Table) -> None:
+        """Take in the heartbeats of a batch."""
+        role, sender = _roles_of(heartbeats), heartbeats.frames.sender
+        self._later = self._now.copy()
+        self._later[sender] = role
+        if (self._now[sender] != role).any():
+            self._changes = heartbeats
+        speaks = np.flatnonzero(role == ROLES.index("autopilot"))
+        for row in speaks[np.unique(sender[speaks], return_index=True)[1]].tolist():
+            system = int(heartbeats.frames.sysid[row])
+            self._autopilots.setdefault(system, int(heartbeats.frames.number[row]))
+
+    def settle(self) -> None:
+        """Take the batch as past."""
+        self._now, self._changes = self._later, None
+
+    def last(self, sender: int) -> int:
+        """Return the latest role of a sender, as a place in ROLES."""
+        return int(self._later[sender])
+
+    def of(self, table: Table) -> Ints:
+        """Return (n,) the role of each sender before each row, as a place in ROLES."""
+        sender = table.frames.sender
+        role: Ints = self._now[sender]
+        if self._changes is None:
+            return role
+        said, by = _roles_of(self._changes), self._changes.frames
+        for changed in np.unique(by.sender[said != self._now[by.sender]]).tolist():
+            rows = np.flatnonzero(sender == changed)
+            own = by.sender == changed
+            before = np.searchsorted(by.number[own], table.frames.number[rows]) - 1
+            role[rows] = np.where(before >= 0, said[own][np.maximum(before, 0)], role[rows])
+        return role
+
+    def autopilot_for(self, sysid: Ints, number: Ints) -> Ints:
+        """Return the sender's own system where its autopilot was heard, else the only one heard.
+
+        Where none was heard yet it is the one that is heard first; negative where it is not known.
+        """
+        if not self._autopilots:
+            return np.full(len(sysid), -1, np.int64)
+        heard_from = np.full(256, np.iinfo(np.int64).max)
+        heard_from[list(self._autopilots)] = list(self._autopilots.values())
+        heard = np.searchsorted(np.sort(list(self._autopilots.values())), number, side="right")
+        only = np.where(heard <= 1, np.argmin(heard_from), -1)
+        return np.where(heard_from[sysid] <= number, sysid, only)
+
+
+def _roles_of(heartbeats: Table) -> Ints:
+    """Return (n,) the role that each HEARTBEAT announces, as a place in ROLES."""
+    kind = heartbeats["type"].astype(np.int64) << 8 | heartbeats["autopilot"]
+    kinds, which = np.unique(kind, return_inverse=True)
+    names = [role_from_heartbeat(k >> 8, k & 0xFF) for k in kinds.tolist()]
+    return np.array([ROLES.index(name) for name in names], np.int64)[which]
+
+
 def version_number(major: int, minor: int, patch: int) -> int:
     """Return a version as one number that sorts: 4.5.7 is 4005007."""
     return (major * _VERSION_BASE + minor) * _VERSION_BASE + patch
 
 
-def version_text(number: float) -> str | None:
-    """Return ``4.5.7`` for 4005007, None for what is not known (NaN)."""
-    if not number > 0:
+def version_text(number: float | None) -> str | None:
+    """Return ``4.5.7`` for 4005007, None for what is not known."""
+    if number is None:
         return None
     rest, patch = divmod(int(number), _VERSION_BASE)
     major, minor = divmod(rest, _VERSION_BASE)
