@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from mavframecheck.geo.geodesy import bearing_deg, distance_m
+
 FIELD_FUNCTIONS = frozenset(
     {
         "raw",
@@ -34,19 +36,6 @@ fields); diagonal: (n, k) variances of a covariance; correlation: (n,) the large
 covariance, above 1 when it is none; words: for texts, what a mask, frame or enumeration value means.
 """
 
-EARTH_RADIUS_KM = 6371.0088
-
-
-def distance_km(lat1: Any, lon1: Any, lat2: Any, lon2: Any) -> Any:
-    """Return the great-circle distance, km, of positions in degrees, within 0.5 % of the ellipsoid's.
-
-    Source: haversine formula on the mean sphere (IUGG R1).
-    """
-    phi1, phi2 = np.radians(lat1), np.radians(lat2)
-    half = np.sin((phi2 - phi1) / 2) ** 2
-    half = half + np.cos(phi1) * np.cos(phi2) * np.sin(np.radians(np.subtract(lon2, lon1)) / 2) ** 2
-    return 2 * EARTH_RADIUS_KM * np.arcsin(np.sqrt(np.clip(half, 0, 1)))
-
 
 def some(column: Any) -> Any:
     """Return (n,) whether any element of each row of an array field holds."""
@@ -73,6 +62,18 @@ def float32_step(value: Any) -> Any:
     return np.spacing(np.abs(value).astype(np.float32)).astype(np.float64)
 
 
+def undulation(lat: Any, lon: Any) -> Any:
+    """Return the height of the geoid above the ellipsoid (EGM96), m, at positions in degrees."""
+    from mavframecheck.geo.geoid import undulation as of_geoid  # the grid is read when asked for
+
+    return of_geoid(lat, lon)
+
+
+def wrap_pi(angle: Any) -> Any:
+    """Return an angle in -pi..pi, rad."""
+    return np.arctan2(np.sin(angle), np.cos(angle))
+
+
 def fixed(value: Any, digits: int) -> Any:
     """Return numbers as texts with `digits` decimals, for texts of findings."""
     flat = [f"{number:.{int(digits)}f}" for number in np.ravel(value).tolist()]
@@ -84,6 +85,9 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "min": np.minimum,
     "max": np.maximum,
     "sqrt": np.sqrt,
+    "hypot": np.hypot,
+    "arctan2": np.arctan2,
+    "wrap_pi": wrap_pi,
     "round": np.round,
     "sin": np.sin,
     "cos": np.cos,
@@ -95,7 +99,9 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "every": every,
     "smallest": smallest,
     "norm": norm,
-    "distance_km": distance_km,
+    "distance_m": distance_m,
+    "bearing_deg": bearing_deg,
+    "undulation": undulation,
     "fixed": fixed,
     "float32_step": float32_step,
 }
