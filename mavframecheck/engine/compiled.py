@@ -87,14 +87,19 @@ class CompiledRule:
         spoken = [condition for condition, _ in self.severities]
         for template in (self.text, self.fix, *self.evidence.values()):
             spoken += template.expressions
-        named = map(self._contexts, (self.when, self.worst, *spoken))
-        return self.required.union(*named) - ALWAYS_KNOWN
+        parts = [p for e in (self.when, self.flag, self.worst, *spoken) for p in self._with_lets(e)]
+        named = self.required.union(*(part.contexts | part.hoped for part in parts))
+        return frozenset(name for name in named - ALWAYS_KNOWN if NAMES[name].waits)
 
     def _contexts(self, expression: Expression | None) -> set[str]:
+        return set().union(*(each.contexts for each in self._with_lets(expression)))
+
+    def _with_lets(self, expression: Expression | None) -> list[Expression]:
+        """Return an expression and the named ones that it uses."""
         if expression is None:
-            return set()
-        nested = [self._contexts(self.lets[n]) for n in expression.used_names if n in self.lets]
-        return set(expression.contexts).union(*nested)
+            return []
+        named = [self.lets[name] for name in expression.used_names if name in self.lets]
+        return [expression, *(part for each in named for part in self._with_lets(each))]
 
     def _expression(self, code: str, names: frozenset[str], key: str) -> Any:
         if not code:

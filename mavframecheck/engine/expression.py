@@ -18,6 +18,10 @@ from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import NAMES
 
 MAX_LENGTH = 2000
+OF_STACK = frozenset({"does", "does_surely", "answer_to", "note_on"})
+"""Functions of a field that read the acceptance data."""
+NEEDED = frozenset({"vehicle.autopilot", "vehicle.version"})
+"""Context that those, and stack(), read."""
 MAX_DEPTH = 60
 ANY_NAME = "*"
 """Among the names of an expression: any name is allowed (a Python check gives the values)."""
@@ -40,6 +44,9 @@ class Scope(Protocol):
 
     def name(self, name: str) -> Any:
         """Return a parameter or named expression of the rule."""
+
+    def stack(self, key: str) -> Any:
+        """Return what the autopilot's acceptance data says of the message under `key`."""
 
     def context(self, name: str) -> Any:
         """Return a context column, e.g. ``vehicle.lat``."""
@@ -85,6 +92,8 @@ class Expression:
         """Context columns it reads."""
         self.tested: set[str] = set()
         """Those of them that it asks about with known()."""
+        self.hoped: set[str] = set()
+        """Context that it can do without."""
         self.used_names: set[str] = set()
         self._names = names
         self._evaluate = self._compile(_parse(source))
@@ -217,6 +226,8 @@ class Expression:
             return self._field_call(name, node)
         if name == "known":
             return self._known(node)
+        if name == "stack":
+            return self._stack(node)
         if name not in FUNCTIONS:
             raise _error(
                 node,
@@ -229,7 +240,21 @@ class Expression:
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Name):
             raise _error(node, f"{function}() takes the name of one field")
         field = node.args[0].id
+        if function in OF_STACK:
+            self.hoped |= NEEDED
         return lambda scope: scope.field(function, field)
+
+    def _stack(self, node: ast.Call) -> Evaluate:
+        """Compile ``stack('partial_axes')``: a fact about the message, for the autopilot meant."""
+        key = (
+            node.args[0].value
+            if len(node.args) == 1 and isinstance(node.args[0], ast.Constant)
+            else None
+        )
+        if not isinstance(key, str):
+            raise _error(node, "stack() takes the name of one fact, as in stack('partial_axes')")
+        self.hoped |= NEEDED
+        return lambda scope: scope.stack(key)
 
     def _known(self, node: ast.Call) -> Evaluate:
         """Compile ``known(home.lat)``: whether this context has come, or came in time."""

@@ -24,6 +24,10 @@ FIELD_FUNCTIONS = frozenset(
         "diagonal",
         "correlation",
         "words",
+        "does",
+        "does_surely",
+        "answer_to",
+        "note_on",
     }
 )
 """Functions of a field, by name; `engine.rows` answers them.
@@ -34,6 +38,9 @@ any element is NaN, and that is no sentinel);
 undefined: the bits of a mask, or the value of an enumeration, that the standard does not define; present: given by the sender (extension
 fields); diagonal: (n, k) variances of a covariance; correlation: (n,) the largest squared correlation of a
 covariance, above 1 when it is none; words: for texts, what a mask, frame or enumeration value means.
+Of the field that holds the MAV_FRAME, by what the autopilot that the row is about does with it (acceptance
+data): does: obeyed, misread, refused, ignored, stops or unknown; does_surely: whether every version that could
+be meant does so; answer_to: what it says; note_on: what there is to know.
 """
 
 

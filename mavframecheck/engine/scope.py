@@ -7,8 +7,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from mavframecheck.engine import stacks
 from mavframecheck.engine.compiled import Binding, RuleFileError
 from mavframecheck.engine.rows import Rows
+from mavframecheck.semantics.acceptance import Verdict
 from mavframecheck.semantics.tags import FieldTag
 
 
@@ -29,6 +31,8 @@ class RuleScope:
         plain = _OF_FIELD.get(function)
         if plain is not None:
             return plain(self.rows, field)
+        if function in _OF_STACK:
+            return stacks.verdicts(self.rows, self.binding.message, field, _OF_STACK[function])
         if function == "words":
             return self.rows.words(field, tag)
         if tag is None:
@@ -49,6 +53,10 @@ class RuleScope:
             return self._names[name]
         tag = self.binding.tag
         return self.binding.message if name == "message" else (tag.field if tag is not None else "")
+
+    def stack(self, key: str) -> Any:
+        """Return a fact about the message, by the autopilot that each row is about."""
+        return stacks.facts(self.rows, self.binding.message, key)
 
     def context(self, name: str) -> Any:
         """Return the values of a context column."""
@@ -77,6 +85,10 @@ class ValueScope:
             raise RuleFileError(message)
         return self._values[name]
 
+    def stack(self, key: str) -> Any:
+        """Facts are unknown here."""
+        raise RuleFileError(f"stack({key!r}) cannot be used in the texts of a Python check")
+
     def context(self, name: str) -> Any:
         """Context is unknown here."""
         raise RuleFileError(f"{name} cannot be used in the texts of a Python check")
@@ -90,6 +102,12 @@ def _ignored(rows: Rows, tag: FieldTag) -> Any:
     return np.logical_not(rows.used(tag))
 
 
+_OF_STACK: dict[str, Callable[[Verdict], Any]] = {
+    "does": lambda verdict: str(verdict.consequence),
+    "does_surely": lambda verdict: verdict.certain,
+    "answer_to": lambda verdict: verdict.answer,
+    "note_on": lambda verdict: verdict.note,
+}
 _OF_FIELD: dict[str, Callable[[Rows, str], Any]] = {"raw": Rows.raw, "present": Rows.present}
 _OF_TAG: dict[str, Callable[[Rows, FieldTag], Any]] = {
     "si": Rows.si,

@@ -119,7 +119,8 @@ class Context:
         if entry.after:
             return kept.after(asked, entry.max_age_us or 0)
         before = kept.before(asked, entry.max_age_us)
-        if before.found.all() or (self._assumed is not None and history == "identity"):
+        alone = not entry.waits or (self._assumed is not None and history == "identity")
+        if alone or before.found.all():
             return before
         after = kept.after(asked)
         return Answer(*(np.where(before.found, b, a) for b, a in zip(before, after, strict=True)))

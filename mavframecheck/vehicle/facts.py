@@ -46,6 +46,8 @@ class Name(NamedTuple):
     max_age_us: int | None = None
     """Older than this it is unknown."""
     key: Literal["system", "sender", "command"] = "system"
+    waits: bool = True
+    """Whether a row waits for it; what most recordings never say is not worth waiting for."""
     after: bool = False
     """Whether it is said after the row (an answer) rather than before it."""
 
@@ -238,6 +240,7 @@ NAMES: dict[str, Name] = {
         (("versions", "version"),),
         "version as one number: 4.5.7 is 4005007",
         "neither AUTOPILOT_VERSION nor a boot banner says the version",
+        waits=False,
     ),
     "vehicle.capabilities": Name(
         (("capabilities", "mask"),), "MAV_PROTOCOL_CAPABILITY bits", "no AUTOPILOT_VERSION"
