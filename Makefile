@@ -7,7 +7,7 @@ CORPUS ?= ../shared/corpus
 BASELINE ?= build/corpus-baseline.jsonl
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check generate samples bench accuracy corpus-diff clean
+.PHONY: help demo test check generate samples bench accuracy corpus-frames corpus-diff clean
 
 help:  ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -30,6 +30,7 @@ check: $(READY)  ## lint, format, types
 
 generate: $(READY)  ## write again what is generated into the package
 	$(BIN)/python -m mavframecheck.wire.generate
+	$(BIN)/python -m mavframecheck.semantics.acceptance
 	$(BIN)/python -m mavframecheck.engine.pack
 	$(BIN)/python -m mavframecheck.report.schema
 
@@ -41,6 +42,9 @@ bench: $(READY)  ## speed and memory against the required figures (about five mi
 
 accuracy: $(READY)  ## found, missed and false alarms on the labelled recordings
 	$(BIN)/python -m benchmarks.accuracy --corpus $(CORPUS)
+
+corpus-frames: $(READY)  ## every frame of every recording against pymavlink (about three minutes)
+	MAVFRAMECHECK_FULL_CORPUS=1 $(BIN)/python -m pytest -q -s tests/wire/test_corpus.py
 
 corpus-diff: $(READY)  ## findings added and removed since `make corpus-diff SAVE=--save`
 	$(BIN)/python -m benchmarks.corpus_diff --corpus $(CORPUS) --baseline $(BASELINE) $(SAVE)

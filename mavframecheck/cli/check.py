@@ -109,7 +109,7 @@ def check(
     audit = Audit(paths, pack, _settings(pack, **chosen))
     context = page_context(verbose=verbose)._replace(rules=tuple(pack.rules))
     echo(load(form)(audit.results(), context))
-    ctx.exit(audit.exit_code(Severity(fail_on)))
+    ctx.exit(audit.verdict(Severity(fail_on)))
 
 
 def _settings(

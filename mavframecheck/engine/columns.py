@@ -23,6 +23,8 @@ PAUSE = 20.0
 """An interval this many times longer than the others is a pause..."""
 PAUSE_SHARE = 0.05
 """... as long as at most this share of the intervals are pauses."""
+FASTEST_HZ = 1000.0
+"""What seems faster came all at once: it has no rate."""
 _BINS = 80
 
 
@@ -76,7 +78,7 @@ class Intervals:
         self._last = int(t_us[-1])
 
     def rate_hz(self) -> float | None:
-        """Return messages per second while the stream ran, None where too few can be timed."""
+        """Return messages per second while the stream ran, None where there is no such number."""
         counts, sums = self._counts.tolist(), self._sums.tolist()
         count, total = sum(counts), sum(sums)
         most_pauses = PAUSE_SHARE * count
@@ -88,7 +90,7 @@ class Intervals:
             if most_pauses < 0 or (number and length * rest < PAUSE * left * number):
                 break
             count, total = rest, left
-        return count * 1e6 / total if total > 0 else None
+        return count * 1e6 / total if total * FASTEST_HZ >= count * 1e6 else None
 
 
 class FieldColumn:

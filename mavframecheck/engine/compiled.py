@@ -19,8 +19,8 @@ from mavframecheck.semantics.mavframe import frames_of
 from mavframecheck.semantics.tags import Condition, FieldTag
 from mavframecheck.vehicle import NAMES
 
-OWN_NAMES = frozenset({"message", "field"})
-"""Names that every rule knows: the message and the field that it is looking at."""
+OWN_NAMES = frozenset({"message", "field", "unit"})
+"""Names that every rule knows: the message and the field that it is looking at, and the field's unit."""
 ALWAYS_KNOWN = frozenset({"sender.role"})
 """Context that never has to be waited for."""
 

@@ -18,7 +18,7 @@ from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import NAMES
 
 MAX_LENGTH = 2000
-OF_STACK = frozenset({"does", "does_surely", "answer_to", "note_on"})
+OF_STACK = frozenset({"does", "does_surely", "answer_to", "note_on", "reference"})
 """Functions of a field that read the acceptance data."""
 NEEDED = frozenset({"vehicle.autopilot", "vehicle.version"})
 """Context that those, and stack(), read."""
@@ -47,6 +47,9 @@ class Scope(Protocol):
 
     def stack(self, key: str) -> Any:
         """Return what the autopilot's acceptance data says of the message under `key`."""
+
+    def listed(self, key: str, values: Any) -> Any:
+        """Return whether `values` are in the set that the acceptance data has under `key`."""
 
     def context(self, name: str) -> Any:
         """Return a context column, e.g. ``vehicle.lat``."""
@@ -228,6 +231,8 @@ class Expression:
             return self._known(node)
         if name == "stack":
             return self._stack(node)
+        if name == "listed":
+            return self._listed(node)
         if name not in FUNCTIONS:
             raise _error(
                 node,
@@ -255,6 +260,19 @@ class Expression:
             raise _error(node, "stack() takes the name of one fact, as in stack('partial_axes')")
         self.hoped |= NEEDED
         return lambda scope: scope.stack(key)
+
+    def _listed(self, node: ast.Call) -> Evaluate:
+        """Compile ``listed('child_frames', raw(child_frame_id))``: a value against a set of numbers."""
+        first = node.args[0] if len(node.args) == 2 else None
+        key = first.value if isinstance(first, ast.Constant) else None
+        if not isinstance(key, str):
+            raise _error(
+                node,
+                "listed() takes the name of a set and a value, as in listed('child_frames', raw(f))",
+            )
+        self.hoped |= NEEDED
+        value = self._compile(node.args[1])
+        return lambda scope: scope.listed(key, value(scope))
 
     def _known(self, node: ast.Call) -> Evaluate:
         """Compile ``known(home.lat)``: whether this context has come, or came in time."""

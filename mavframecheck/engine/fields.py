@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 from mavframecheck.engine.columns import FieldColumn, Tally
 from mavframecheck.model.survey import FieldSurvey, ReferenceCount, SentinelCount, ValueCount
 from mavframecheck.semantics import catalogue, masks
-from mavframecheck.semantics.constants import entry_name
+from mavframecheck.semantics.constants import entries
 from mavframecheck.semantics.enums import AltRef, Clock, Frame
 from mavframecheck.semantics.mavframe import frame_name
 from mavframecheck.semantics.references import selected_height, selected_reference
@@ -65,7 +66,7 @@ def _scaled(raw: float | None, tag: FieldTag | None) -> float | None:
 def values_seen(tally: Tally | None, enum: str) -> tuple[ValueCount, ...]:
     """Return what a tally counted, most frequent first, with what `enum` says of each value."""
     return tuple(
-        ValueCount(value=_text(value), words=_said(enum, value), count=count)
+        ValueCount(value=_text(value), words=value_said(enum, value), count=count)
         for value, count in (tally.ranked() if tally is not None else ())
     )
 
@@ -74,12 +75,24 @@ def _text(value: Any) -> int | str:
     return value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else int(value)
 
 
-def _said(enum: str, value: Any) -> str | None:
+def value_said(enum: str, value: Any) -> str | None:
+    """Return the bits in words, or the entry; None for a value or an enumeration without names."""
     if not enum or isinstance(value, bytes):
         return None
     if enum in masks.mask_enums():
-        return "; ".join(masks.words(enum, value))
-    return frame_name(value) if enum == "MAV_FRAME" else entry_name(enum, value)
+        return "; ".join(masks.words(enum, int(value)))
+    if enum == "MAV_FRAME":
+        return frame_name(value)
+    return _entries(enum).get(int(value))
+
+
+@cache
+def _entries(enum: str) -> dict[int, str]:
+    """Return value -> entry of an enumeration; empty for one that the tables do not name."""
+    try:
+        return {value: name for name, value in entries(enum).items()}
+    except KeyError:
+        return {}
 
 
 def _frames(column: FieldColumn) -> tuple[ReferenceCount, ...]:
@@ -105,9 +118,11 @@ def _heights(column: FieldColumn) -> tuple[ReferenceCount, ...]:
 
 
 def _selector_enum(tag: FieldTag) -> str:
-    """Return the enumeration of the field that selects the frame of `tag`."""
-    enums = [each.enum for each in catalogue.tags_of(tag.message, tag.frame_field) if each.enum]
-    return enums[0] if enums else "MAV_FRAME"
+    """Return the enumeration of the field that selects the frame of `tag`, in the same view."""
+    selectors = catalogue.tags_of(tag.message, tag.frame_field)
+    enums = [each.enum for each in selectors if each.enum and set(each.when) <= set(tag.when)]
+    usual = "GIMBAL_MANAGER_FLAGS" if tag.frame is Frame.GIMBAL_BY_FLAGS else "MAV_FRAME"
+    return enums[0] if enums else usual
 
 
 def _summed(counted: Any) -> tuple[ReferenceCount, ...]:

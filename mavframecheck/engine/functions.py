@@ -12,6 +12,7 @@ from mavframecheck.geo.geodesy import bearing_deg, distance_m
 FIELD_FUNCTIONS = frozenset(
     {
         "raw",
+        "optional",
         "si",
         "used",
         "ignored",
@@ -28,11 +29,15 @@ FIELD_FUNCTIONS = frozenset(
         "does_surely",
         "answer_to",
         "note_on",
+        "reference",
+        "groups_used",
+        "used_zero",
+        "ignored_given",
     }
 )
 """Functions of a field, by name; `engine.rows` answers them.
 
-raw: as on the wire; si: in SI by the catalogue (latitude and longitude in degrees); used, ignored: by the
+raw: as on the wire (optional: NaN in a message that has no such field); si: in SI by the catalogue (latitude and longitude in degrees); used, ignored: by the
 field's own ignore bit; unknown: a sentinel that says "not known" (any_unknown: in any element; any_nan:
 any element is NaN, and that is no sentinel);
 undefined: the bits of a mask, or the value of an enumeration, that the standard does not define; present: given by the sender (extension
@@ -41,6 +46,12 @@ covariance, above 1 when it is none; words: for texts, what a mask, frame or enu
 Of the field that holds the MAV_FRAME, by what the autopilot that the row is about does with it (acceptance
 data): does: obeyed, misread, refused, ignored, stops or unknown; does_surely: whether every version that could
 be meant does so; answer_to: what it says; note_on: what there is to know.
+reference: what a height is measured from, in the words of `AltRef` (msl, home, terrain, ellipsoid...): by its
+catalogue entry, by the selector in the same row, else by what the autopilot takes it for.
+Of a mask: groups_used: how many groups of fields it lets count (position, velocity, rates...); used_zero:
+whether all that it lets count is exactly zero; ignored_given: whether it ignores groups as a whole and each of
+them holds something.
+Instead of a field, does, does_surely, answer_to and note_on take ``message`` where a message has no frame.
 """
 
 
@@ -69,11 +80,33 @@ def float32_step(value: Any) -> Any:
     return np.spacing(np.abs(value).astype(np.float32)).astype(np.float64)
 
 
+def power_of_ten(ratio: Any) -> Any:
+    """Return the power of ten nearest to a positive number: 1000 for 870, 0.1 for 0.12; NaN for no such number."""
+    return np.where(ratio > 0, 10.0 ** np.round(np.log10(ratio)), np.nan)
+
+
 def undulation(lat: Any, lon: Any) -> Any:
     """Return the height of the geoid above the ellipsoid (EGM96), m, at positions in degrees."""
     from mavframecheck.geo.geoid import undulation as of_geoid  # the grid is read when asked for
 
     return of_geoid(lat, lon)
+
+
+def outside(value: Any, one: Any, other: Any) -> Any:
+    """Return how far a number lies outside the stretch between two others, 0 within; one may be NaN."""
+    low, high = np.fmin(one, other), np.fmax(one, other)
+    return np.maximum(np.maximum(low - value, value - high), 0.0)
+
+
+def least(*named: Any) -> Any:
+    """Return the name whose number is least: ``least('home', 3.0, 'sea level', 480.0)`` is ``home``.
+
+    NaN never wins; of equals the first one does. Empty where all are NaN.
+    """
+    names, numbers = named[::2], np.broadcast_arrays(*(np.asarray(n, float) for n in named[1::2]))
+    stacked = np.where(np.isnan(numbers), np.inf, numbers)
+    best = np.array(names)[np.argmin(stacked, axis=0)]
+    return np.where(np.isnan(numbers).all(axis=0), "", best)
 
 
 def wrap_pi(angle: Any) -> Any:
@@ -109,6 +142,9 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "distance_m": distance_m,
     "bearing_deg": bearing_deg,
     "undulation": undulation,
+    "outside": outside,
+    "least": least,
     "fixed": fixed,
     "float32_step": float32_step,
+    "power_of_ten": power_of_ten,
 }

@@ -12,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.geo.covariance import squared_correlation
-from mavframecheck.semantics import masks
+from mavframecheck.semantics import catalogue, masks
 from mavframecheck.semantics.constants import entries, entry_name
-from mavframecheck.semantics.enums import Axis
+from mavframecheck.semantics.enums import AltRef, Axis
+from mavframecheck.semantics.references import selected_height
 from mavframecheck.semantics.tags import FieldTag, Sentinel
 from mavframecheck.vehicle import Context, Known
 from mavframecheck.wire import Table
@@ -131,6 +132,18 @@ class Rows:
         if tag.enum in masks.mask_enums():
             return raw & ~np.int64(sum(bit.bit for bit in masks.bits(tag.enum)))
         return np.where(np.isin(raw, list(entries(tag.enum).values())), 0, raw)
+
+    def references(self, tag: FieldTag) -> Any:
+        """Return (n,) what each row's height `tag` is measured from, a word of `AltRef`."""
+        if tag.alt_ref not in (AltRef.BY_FRAME, AltRef.BY_FIELD):
+            return np.full(len(self), str(tag.alt_ref))
+        raw = np.nan_to_num(self.raw(tag.frame_field), nan=-1.0).astype(np.int64)
+        values, which = np.unique(raw, return_inverse=True)
+        selectors = catalogue.tags_of(tag.message, tag.frame_field)
+        same_view = (each for each in selectors if set(each.when) <= set(tag.when))
+        enum = next((each.enum for each in same_view if each.enum), "MAV_FRAME")
+        words = [str(selected_height(enum, value)) for value in values.tolist()]
+        return np.array(words)[which.reshape(-1)]
 
     def present(self, field: str) -> Bools:
         """Return (n,) whether the sender gave the field."""

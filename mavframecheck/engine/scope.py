@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from mavframecheck.engine import stacks
+from mavframecheck.engine import governed, stacks
 from mavframecheck.engine.compiled import Binding, RuleFileError
 from mavframecheck.engine.rows import Rows
 from mavframecheck.semantics.acceptance import Verdict
@@ -25,8 +25,12 @@ class RuleScope:
 
     def field(self, function: str, name: str) -> Any:
         """Return ``function(name)`` as a column; RuleFileError when the message has no such field."""
+        if function in _OF_STACK and name == "message":
+            return stacks.verdicts(self.rows, self.binding.message, "", _OF_STACK[function])
         field, tag = self.binding.resolve(name)
         if field not in self.rows.table.layout.by_name:
+            if function == "optional":
+                return np.full(len(self.rows), np.nan)
             self._refuse(f"{self.binding.message} has no field called {name!r}")
         plain = _OF_FIELD.get(function)
         if plain is not None:
@@ -40,10 +44,12 @@ class RuleScope:
             self._refuse(f"{function}({name}): the catalogue has no meaning for {meant}")
         if function == "quaternion":
             return self.rows.quaternion(tag, self.binding.partners)
+        if function == "reference":
+            return stacks.references(self.rows, self.binding.message, tag)
         return _OF_TAG[function](self.rows, tag)
 
     def name(self, name: str) -> Any:
-        """Return a parameter, a named expression, or (in texts) the message or field."""
+        """Return a parameter, a named expression, the message, or the field and its unit."""
         rule = self.binding.rule
         if name in rule.params:
             return rule.params[name]
@@ -51,12 +57,18 @@ class RuleScope:
             if name not in self._names:
                 self._names[name] = rule.lets[name](self)
             return self._names[name]
+        if name == "message":
+            return self.binding.message
         tag = self.binding.tag
-        return self.binding.message if name == "message" else (tag.field if tag is not None else "")
+        return "" if tag is None else tag.unit if name == "unit" else tag.field
 
     def stack(self, key: str) -> Any:
         """Return a fact about the message, by the autopilot that each row is about."""
         return stacks.facts(self.rows, self.binding.message, key)
+
+    def listed(self, key: str, values: Any) -> Any:
+        """Return whether `values` are among a set of numbers that is a fact about the message."""
+        return stacks.listed(self.rows, self.binding.message, key, values)
 
     def context(self, name: str) -> Any:
         """Return the values of a context column."""
@@ -89,6 +101,10 @@ class ValueScope:
         """Facts are unknown here."""
         raise RuleFileError(f"stack({key!r}) cannot be used in the texts of a Python check")
 
+    def listed(self, key: str, values: Any) -> Any:
+        """Facts are unknown here."""
+        raise RuleFileError(f"listed({key!r}) cannot be used in the texts of a Python check")
+
     def context(self, name: str) -> Any:
         """Context is unknown here."""
         raise RuleFileError(f"{name} cannot be used in the texts of a Python check")
@@ -108,7 +124,11 @@ _OF_STACK: dict[str, Callable[[Verdict], Any]] = {
     "answer_to": lambda verdict: verdict.answer,
     "note_on": lambda verdict: verdict.note,
 }
-_OF_FIELD: dict[str, Callable[[Rows, str], Any]] = {"raw": Rows.raw, "present": Rows.present}
+_OF_FIELD: dict[str, Callable[[Rows, str], Any]] = {
+    "raw": Rows.raw,
+    "optional": Rows.raw,
+    "present": Rows.present,
+}
 _OF_TAG: dict[str, Callable[[Rows, FieldTag], Any]] = {
     "si": Rows.si,
     "used": _used,
@@ -119,4 +139,7 @@ _OF_TAG: dict[str, Callable[[Rows, FieldTag], Any]] = {
     "undefined": Rows.undefined,
     "diagonal": Rows.diagonal,
     "correlation": Rows.correlation,
+    "groups_used": governed.groups_used,
+    "used_zero": governed.used_zero,
+    "ignored_given": governed.ignored_given,
 }

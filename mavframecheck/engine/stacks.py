@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from mavframecheck.engine.rows import Rows
 from mavframecheck.semantics import acceptance
+from mavframecheck.semantics.enums import AltRef
+from mavframecheck.semantics.tags import FieldTag
 
 FAMILY, VERSION = "vehicle.autopilot", "vehicle.version"
 
@@ -29,30 +31,57 @@ def verdicts(
 def facts(rows: Rows, message: str, key: str) -> Any:
     """Return (n,) a fact about the message as text, ``unknown`` where the data has none."""
 
-    def of(family: str, version: float, command: int | None, _frame: int) -> str:
+    def of(family: str, version: float, command: int | None, _: int) -> str:
         found = acceptance.fact(family, message, key, command, version)
         return "unknown" if found is None else str(found)
 
     return _column(rows, np.zeros(len(rows), np.int64), of)
 
 
-def _column(rows: Rows, frames: npt.NDArray[np.int64], of: Callable[..., Any]) -> Any:
-    """Return (n,) `of` for each row; rows of one family, version, command and frame ask once."""
+def listed(rows: Rows, message: str, key: str, values: Any) -> Any:
+    """Return (n,) ``yes`` or ``no``: whether each row's value is in the set that the data has under `key`.
+
+    ``unknown`` where there is none, or the versions in question differ.
+    """
+
+    def of(family: str, version: float, command: int | None, value: int) -> str:
+        known = acceptance.numbers(family, message, key, command, version)
+        if known is None:
+            return "unknown"
+        return "yes" if value in known else "no"
+
+    return _column(rows, np.broadcast_to(values, len(rows)), of)
+
+
+def references(rows: Rows, message: str, tag: FieldTag) -> Any:
+    """Return (n,) what each row's height `tag` is measured from, a word of `AltRef`.
+
+    A message without a frame is read as the autopilot takes it; ``unspecified`` where nobody knows.
+    """
+    found = rows.references(tag)
+    if AltRef.UNSPECIFIED not in found:
+        return found
+    taken = facts(rows, message, "z_reference")
+    return np.where((found == AltRef.UNSPECIFIED) & (taken != "unknown"), taken, found)
+
+
+def _column(rows: Rows, asked: npt.NDArray[np.int64], of: Callable[..., Any]) -> Any:
+    """Return (n,) `of` for each row; rows of one family, version, command and value `asked` about ask once."""
     families, versions = rows.context(FAMILY), rows.context(VERSION)
     commanded = "command" in rows.table.layout.by_name
     commands = rows.raw("command") if commanded else np.zeros(len(rows), np.int64)
     number = np.nan_to_num(versions.values, nan=-1.0)
     kinds, which = np.unique(
-        np.stack([families.values, number, commands, frames], axis=1), axis=0, return_inverse=True
+        np.stack([families.values, number, commands, asked], axis=1), axis=0, return_inverse=True
     )
     answers = [
         of(
             _file_of(families.labels[int(family)]),
             version if version > 0 else float("nan"),
             int(command) if commanded else None,
-            int(frame),
+            int(value),
         )
-        for family, version, command, frame in kinds.tolist()
+        for family, version, command, value in kinds.tolist()
     ]
     return np.array(answers)[which.reshape(-1)]
 

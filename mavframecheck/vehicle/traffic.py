@@ -46,6 +46,13 @@ class Traffic:
         self.t_last: float | None = None
         """Receive time of the first and last frame with a valid stamp, s since 1970."""
 
+    @property
+    def duration_s(self) -> float | None:
+        """Receive time from the first to the last frame, s; None without stamps."""
+        if self.t_first is None or self.t_last is None:
+            return None
+        return self.t_last - self.t_first
+
     def admit(self, frames: Frames) -> Bools:
         """Count `frames`; return (n,) which of them are to be judged."""
         self._note_times(frames)

@@ -14,12 +14,20 @@ import numpy as np
 import numpy.typing as npt
 
 START = 0xFFFF
-WORD = 8
+FEW = 16
+"""Up to this many ranges are checked one by one: that is faster than setting up the columns."""
+WORD = 16
 """Bytes looked up from the buffer at once."""
 LONGEST = 9 + 255 + 1 + WORD
 """Bytes that a checksum covers at most (header without magic, payload, seed), and a word of room."""
-_TAIL_MASKS = np.array([(2**64 - 1) << 8 * n & (2**64 - 1) for n in range(WORD + 1)], np.uint64)
-"""Keep all but the first n bytes of a little-endian word."""
+
+
+@functools.cache
+def _tail_masks() -> npt.NDArray[np.uint16]:
+    """(WORD + 1, WORD / 2) masks that keep all but the first n bytes of a word."""
+    kept = np.arange(WORD) >= np.arange(WORD + 1)[:, None]
+    masks: npt.NDArray[np.uint8] = np.where(kept, np.uint8(0xFF), np.uint8(0))
+    return masks.view("<u2")
 
 
 @functools.cache
@@ -28,6 +36,13 @@ def _byte_table() -> npt.NDArray[np.uint16]:
     table = np.arange(256, dtype=np.uint16)
     for _ in range(8):
         table = np.where(table & 1, (table >> 1) ^ 0x8408, table >> 1).astype(np.uint16)
+    return table
+
+
+@functools.cache
+def _byte_list() -> list[int]:
+    """Return the same as a list, which is faster to ask for one byte."""
+    table: list[int] = _byte_table().tolist()
     return table
 
 
@@ -63,10 +78,10 @@ def _start_values() -> npt.NDArray[np.uint16]:
 
 def crc16(data: bytes) -> int:
     """Return the checksum of one byte string of any length."""
-    step = _byte_table()
+    step = _byte_list()
     crc = START
     for byte in data:
-        crc = int(step[(crc ^ byte) & 0xFF]) ^ (crc >> 8)
+        crc = step[(crc ^ byte) & 0xFF] ^ (crc >> 8)
     return crc
 
 
@@ -80,25 +95,36 @@ def crc16_of_ranges(
 
     `starts`, `lengths` and `seeds` are (n,); ranges are at most 264 long. Result (n,).
     """
-    tables = _distance_tables()
-    order = np.argsort((LONGEST - lengths).astype(np.uint16), kind="stable")
-    left = lengths[order]
-    crc = _start_values()[left + 1] ^ tables[0][seeds[order]]
-    words = np.ndarray(len(buffer) - WORD + 1, "<u8", buffer, strides=(1,))
-    at = starts[order] + left
+    result = np.empty(len(starts), np.uint16)
+    single = np.arange(len(starts)) if len(starts) <= FEW else np.flatnonzero(starts < WORD)
+    for row in single.tolist():
+        covered = buffer[starts[row] : starts[row] + lengths[row]]
+        result[row] = crc16(covered.tobytes() + bytes([seeds[row]]))
+    if len(single) < len(starts):
+        rows = np.flatnonzero(starts >= WORD) if len(single) else np.arange(len(starts))
+        rows = rows[np.argsort((LONGEST - lengths[rows]).astype(np.uint16), kind="stable")]
+        result[rows] = _crc16_of_sorted(buffer, starts[rows], lengths[rows], seeds[rows])
+    return result
+
+
+def _crc16_of_sorted(
+    buffer: npt.NDArray[np.uint8],
+    starts: npt.NDArray[np.int64],
+    lengths: npt.NDArray[np.int64],
+    seeds: npt.NDArray[np.uint8],
+) -> npt.NDArray[np.uint16]:
+    """Return the checksums of ranges in order of falling length, none in the first word of `buffer`."""
+    crc: npt.NDArray[np.uint16] = _start_values()[lengths + 1] ^ _distance_tables()[0][seeds]
+    words = np.ndarray(len(buffer) - WORD + 1, f"V{WORD}", buffer, strides=(1,))
+    left, at = lengths, starts + lengths
     distance = 1
     while len(left) and left[0] > 0:
         active = int(np.searchsorted(-left, 0, side="left"))
         left, at = left[:active] - WORD, at[:active] - WORD
-        word = words[np.maximum(at, 0)]
-        early = np.flatnonzero(at < 0)
-        word[early] <<= (8 * -at[early]).astype(np.uint64)
+        pairs = words[at].view("<u2").reshape(-1, WORD // 2)
         short = int(np.searchsorted(-left, 0, side="right"))
-        word[short:] &= _TAIL_MASKS[-left[short:]]
-        pairs = word.view("<u2").reshape(-1, WORD // 2)
+        pairs[short:] &= _tail_masks()[-left[short:]]
         for k in range(WORD // 2):
             crc[:active] ^= _pair_table(distance + WORD - 2 - 2 * k).take(pairs[:, k])
         distance += WORD
-    result = np.empty(len(order), np.uint16)
-    result[order] = crc
-    return result
+    return crc

@@ -1,11 +1,11 @@
 """Bytes to frames: find every good frame of a byte stream, and say which bytes hold none.
 
-All magic bytes of a buffer are looked at together (header, length, checksum); then one tight loop walks
-from frame to frame. Where the walk meets damage it decides with the least that is certain:
+All magic bytes of a buffer are looked at together (header, length, checksum); then a walk takes runs of
+frames that follow each other. Where the walk meets damage it decides with the least that is certain:
 
 * a frame of a known id counts when its checksum holds;
 * a frame of an unknown id, or one whose checksum fails, counts as such only where another record follows
-  it exactly; otherwise the reader steps on by one byte;
+  it exactly and no frame whose checksum holds begins within it; otherwise the reader steps on by one byte;
 * after damage the reader goes on at the next frame whose checksum holds.
 
 No decision is made before the bytes it depends on are there, so the result does not depend on how a stream
@@ -65,13 +65,15 @@ class Framer:
         self._gap = STAMP if stamped else 0
         self._rest = Chunk(b"", np.zeros(0, np.int64), np.zeros(0, np.int64))
         self._stamps = Stamps()
+        self._lost = ""
 
     def feed(self, chunk: Chunk | None) -> Scan:
         """Return the frames that are certain once `chunk` has arrived; None ends the flow."""
         joined = self._rest if chunk is None else _append(self._rest, chunk)
         buffer = joined.data + PADDING
         walk = _Walk(buffer, len(joined.data), self._dialect, self._gap, final=chunk is None)
-        walk.run()
+        walk.run(self._lost)
+        self._lost = walk.lost
         frames = self._frames(walk, joined)
         damage = [
             Damage(_offset_of(joined, first), last - first, reason)
@@ -82,7 +84,7 @@ class Framer:
 
     def _frames(self, walk: _Walk, chunk: Chunk) -> Frames:
         """Return the accepted candidates of `walk` with their headers, offsets and receive times."""
-        rows = np.array(walk.accepted, np.int64)
+        rows = np.concatenate([*walk.accepted, np.zeros(0, np.int64)])
         c, octets = walk.candidates, walk.octets
         start = c.start[rows]
         v2 = c.v2[rows]
@@ -128,16 +130,20 @@ class Framer:
 
 
 class _Candidates:
-    """Every magic byte of a buffer, read as if a frame began there; all arrays are (m,)."""
+    """Every magic byte of a buffer, read as if a frame began there; all arrays are (m,).
+
+    A MAVLink 2 header with incompatibility flags that this reader does not know is none: such a frame
+    must be dropped (MAVLink developer guide, "Incompatibility Flags").
+    """
 
     def __init__(self, octets: np.typing.NDArray[np.uint8], size: int, dialect: Dialect) -> None:
-        self.start: Ints = np.flatnonzero((octets[:size] - np.uint8(STX_V2)) < 2)
-        at = self.start
+        magic = np.flatnonzero((octets[:size] - np.uint8(STX_V2)) < 2)
+        plain = (octets[magic] != STX_V2) | (octets[magic + 2] <= SIGNED_FLAG)
+        at = self.start = magic[plain]
         self.v2: Bools = octets[at] == STX_V2
-        flags = octets[at + 2]
         self.length: Ints = octets[at + 1].astype(np.int64)
         self.header: Ints = np.where(self.v2, HEADER_V2, HEADER_V1)
-        self.signed: Bools = self.v2 & (flags == SIGNED_FLAG)
+        self.signed: Bools = self.v2 & (octets[at + 2] == SIGNED_FLAG)
         self.end: Ints = at + self.length + self.header + CHECKSUM + SIGNATURE * self.signed
         wide = (
             octets[at + 7]
@@ -148,7 +154,6 @@ class _Candidates:
         self.seeds = dialect.seeds(self.msgid)
         self.known: Bools = self.seeds >= 0
         self.whole: Bools = self.end <= size
-        self.readable: Bools = ~self.v2 | (flags <= SIGNED_FLAG)
         self.good: Bools = np.zeros(len(at), np.bool_)
         self.checked: Bools = np.zeros(len(at), np.bool_)
 
@@ -163,28 +168,31 @@ class _Walk:
         self.size = size
         self.gap = gap
         self.final = final
-        self.accepted: list[int] = []
+        self.accepted: list[Ints] = []
         self.skipped: list[tuple[int, int, str]] = []
         self.done = 0
+        self.lost = ""
+        """Why the reader looks for the next good frame, where it found none up to the end of the buffer."""
         self.candidates = _Candidates(self.octets, size, dialect)
         self._index_successors()
 
-    def run(self) -> None:
-        """Walk from frame to frame until the buffer, or what is certain of it, is used up."""
-        steps = self._steps()
-        accept = self.accepted.append
-        going = True
+    def run(self, lost: str) -> None:
+        """Walk from frame to frame until the buffer, or what is certain of it, is used up.
+
+        `lost` is that of the buffer before: damage goes on until a frame whose checksum holds.
+        """
+        certain = self._certain()
+        chain = np.flatnonzero(certain)
+        breaks = np.flatnonzero(self.successor[chain] != np.append(chain[1:], STOP))
+        going = not lost or self._resume(lost)
         while going:
             i = self._at(self.done + self.gap)
-            if i >= 0:
-                while (following := steps[i]) >= 0:
-                    accept(i)
-                    i = following
-                if following == NO_RECORD:
-                    accept(i)
-                if self.accepted:
-                    self.done = int(self.candidates.end[self.accepted[-1]])
-            going = self._settle(self._at(self.done + self.gap))
+            if i >= 0 and certain[i]:
+                first = int(np.searchsorted(chain, i))
+                last = int(breaks[np.searchsorted(breaks, first)])
+                self._accept(chain[first : last + 1])
+            else:
+                going = self._settle(i)
 
     def _index_successors(self) -> None:
         """Find, for each candidate, the candidate that begins where its record ends."""
@@ -193,16 +201,37 @@ class _Walk:
         self.slot[c.start] = np.arange(len(c.start), dtype=np.int32)
         self.successor = self.slot[c.end + self.gap]
         self.ends_file: Bools = (c.end == self.size) & self.final
-        self.followed: Bools = c.whole & c.readable & ((self.successor >= 0) | self.ends_file)
+        self.followed: Bools = c.whole & ((self.successor >= 0) | self.ends_file)
 
-    def _steps(self) -> list[int]:
-        """Return where the fast walk goes from each candidate: its successor, or STOP to look closer."""
+    def _certain(self) -> Bools:
+        """Return the candidates that count without a closer look: certain frames follow each other."""
         c = self.candidates
         self._check(np.flatnonzero(c.known & self.followed))
         after = self.successor
         certain = c.good | (~c.known & self.followed & (after >= 0) & c.good[after])
-        steps: list[int] = np.where(certain, after, STOP).tolist()
-        return steps
+        unchecked = np.flatnonzero(certain & ~c.good)
+        certain[unchecked] = ~np.any(self._overlaps(unchecked), axis=0)
+        return certain
+
+    def _overlaps(self, rows: Ints) -> tuple[Bools, Bools]:
+        """Return whether a good frame begins within each record at `rows`, and whether one still may.
+
+        What has no checksum that holds must not cost a frame that has one.
+        """
+        c = self.candidates
+        if not len(rows):
+            return np.zeros(0, np.bool_), np.zeros(0, np.bool_)
+        first, last = rows + 1, np.searchsorted(c.start, c.end[rows] + self.gap)
+        window = slice(int(first[0]), int(last.max()))
+        first, last = first - window.start, last - window.start
+        edges = np.zeros(window.stop - window.start + 1, np.int64)
+        np.add.at(edges, first, 1)
+        np.add.at(edges, last, -1)
+        covered = np.cumsum(edges)[:-1] > 0
+        whole = c.whole[window]
+        self._check(window.start + np.flatnonzero(covered & c.known[window] & whole))
+        may_be_good = ~whole & (not self.final)
+        return _any_between(c.good[window], first, last), _any_between(may_be_good, first, last)
 
     def _check(self, rows: Ints) -> None:
         """Compute the checksums of the candidates at `rows` that were not computed yet."""
@@ -224,7 +253,7 @@ class _Walk:
 
     def _is_good(self, i: int) -> bool:
         c = self.candidates
-        if c.known[i] and c.readable[i] and c.whole[i]:
+        if c.known[i] and c.whole[i]:
             self._check(np.array([i]))
         return bool(c.good[i])
 
@@ -234,22 +263,24 @@ class _Walk:
         if i < 0:
             waiting = self.done + self.gap >= self.size and not self.final
             return False if waiting else self._resume("no frame begins where one is due")
-        if not c.readable[i]:
-            return self._resume("a frame with flags that this reader does not know")
         if not c.whole[i]:
             return self._resume(CUT_OFF) if self.final else False
         if self._is_good(i):
-            return self._accept(i)
+            return self._accept(np.array([i]))
         follows = self._record_follows(i)
+        if follows:
+            (holds_good,), (may_hold_good,) = self._overlaps(np.array([i]))
+            if not (holds_good or may_hold_good):
+                return self._accept(np.array([i]))
+            follows = False if holds_good else None
         if follows is None:
             return False
-        if follows:
-            return self._accept(i)
         return self._resume("no checksum that holds, and no record behind it")
 
-    def _accept(self, i: int) -> bool:
-        self.accepted.append(i)
-        self.done = int(self.candidates.end[i])
+    def _accept(self, run: Ints) -> bool:
+        """Take a run of candidates, each of which begins where the one before ends."""
+        self.accepted.append(run)
+        self.done = int(self.candidates.end[run[-1]])
         return True
 
     def _record_follows(self, i: int) -> bool | None:
@@ -260,7 +291,7 @@ class _Walk:
         if c.end[i] + self.gap >= self.size:
             return False if self.final else None
         following = int(self.successor[i])
-        if following < 0 or not c.readable[following]:
+        if following < 0:
             return False
         if not c.whole[following]:
             return False if self.final else None
@@ -269,38 +300,54 @@ class _Walk:
         return None if c.end[following] + self.gap >= self.size and not self.final else False
 
     def _resume(self, reason: str) -> bool:
-        """Skip to the next frame whose checksum holds; return False when the buffer has no more."""
-        position = self.done + self.gap
-        target = _next(self._good_starts, position + 1)
+        """Skip to the next frame whose checksum holds; return False when the buffer has no more.
+
+        The stamp of that frame may be what is missing, so the search begins where the last one ended.
+        """
+        target = self._next_good(self.done)
         if not self.final:
-            unsettled = _next(self._cut_starts, position)
+            unsettled = _next(self._cut_starts, self.done)
             if unsettled is None and target is None:
                 unsettled = self.size
             if unsettled is not None and (target is None or unsettled < target):
                 self._skip_to(unsettled - self.gap, reason)
+                self.lost = reason
                 return False
         self._skip_to(self.size if target is None else target - self.gap, reason)
-        return target is not None and self._accept(self._at(target))
+        return target is not None and self._accept(np.array([self._at(target)]))
 
-    @functools.cached_property
-    def _good_starts(self) -> list[int]:
-        """Starts of all frames whose checksum holds, whether the walk comes by them or not."""
+    def _next_good(self, position: int) -> int | None:
+        """Return the start of the first frame from `position` on whose checksum holds."""
         c = self.candidates
-        self._check(np.flatnonzero(c.known & c.whole & c.readable))
-        starts: list[int] = c.start[c.good].tolist()
-        return starts
+        first, width = int(np.searchsorted(c.start, position)), 8
+        while first < len(c.start):
+            rows = np.arange(first, min(first + width, len(c.start)))
+            rows = rows[c.known[rows] & c.whole[rows]]
+            self._check(rows)
+            good = rows[c.good[rows]]
+            if len(good):
+                return int(c.start[good[0]])
+            first, width = first + width, width * 2
+        return None
 
     @functools.cached_property
     def _cut_starts(self) -> list[int]:
         """Starts of what may be frames that the end of the buffer cuts off."""
         c = self.candidates
-        starts: list[int] = c.start[~c.whole & c.readable].tolist()
+        starts: list[int] = c.start[~c.whole].tolist()
         return starts
 
     def _skip_to(self, position: int, reason: str) -> None:
         if position > self.done:
             self.skipped.append((self.done, position, reason))
             self.done = position
+
+
+def _any_between(flags: Bools, first: Ints, last: Ints) -> Bools:
+    """Return for each range ``first : last`` whether any of `flags` in it holds."""
+    before = np.concatenate(([0], np.cumsum(flags)))
+    holds: Bools = before[last] > before[first]
+    return holds
 
 
 def _next(starts: list[int], position: int) -> int | None:

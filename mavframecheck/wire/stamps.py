@@ -26,6 +26,8 @@ class Stamps:
         self._previous: int | None = None
         self._run = 0
         self._trusted: int | None = None
+        self._continues = True
+        """Whether the current run began within an hour of the last believed stamp."""
 
     def valid(self, t_us: Ints, has_stamp: Bools) -> Bools:
         """Return, for each stamp, whether it is plausible and agrees with those around it; (n,).
@@ -46,17 +48,20 @@ class Stamps:
         torn = set(breaks.tolist())
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             if first in torn:
-                self._run = 0
+                self._begin_run(int(stamps[first]))
             believed = self._believe(stamps[first:last])
             result[rows[first : first + believed]] = False
         self._previous = int(stamps[-1])
         return result
 
+    def _begin_run(self, first: int) -> None:
+        self._run = 0
+        self._continues = self._trusted is None or abs(first - self._trusted) <= TEAR_US
+
     def _believe(self, run: Ints) -> int:
         """Take a stretch of one run; return how many of its first stamps are not believed."""
         distrusted = 0
-        continues = self._trusted is None or abs(int(run[0]) - self._trusted) <= TEAR_US
-        if not continues:
+        if not self._continues:
             distrusted = min(max(SETTLED - 1 - self._run, 0), len(run))
         if distrusted < len(run):
             self._trusted = int(run[-1])

@@ -1,0 +1,91 @@
+"""Reading several files, one after the other: one that cannot be read does not stop the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Generic, TypeVar
+
+import click
+
+from mavframecheck.cli.output import complain
+from mavframecheck.cli.progress import Progress
+from mavframecheck.report.escape import sentence
+from mavframecheck.report.words import plural
+from mavframecheck.sources import NoRecordingError, SourceError, expand
+from mavframecheck.wire import DialectError
+
+DONE, FAILED, NOTHING, INTERRUPTED = 0, 2, 3, 130
+
+Result = TypeVar("Result")
+Advance = Callable[[int], None]
+Read = Callable[[str, Advance | None], tuple[Result, int]]
+"""Reads one file; returns what is to be shown, and how many frames could be decoded."""
+
+
+class Files(Generic[Result]):
+    """The files of one command, what reads each, and what is needed to choose its exit code."""
+
+    def __init__(self, paths: Sequence[str], read: Read[Result]) -> None:
+        self._paths = paths
+        self._read = read
+        self._unreadable = 0
+        self._refused = 0
+        self._frames = 0
+        self._interrupted = False
+
+    def results(self) -> Iterator[Result]:
+        """Yield what each file gives; Ctrl-C ends the list, and what is done is shown."""
+        files = self._files()
+        progress = Progress(len(files))
+        try:
+            for path in files:
+                yield from self._one(path, progress)
+        except KeyboardInterrupt:
+            self._interrupted = True
+            complain("interrupted: what follows is not all")
+
+    def exit_code(self) -> int:
+        """Return the exit code once the results are used up."""
+        if self._interrupted:
+            return INTERRUPTED
+        if self._unreadable or (self._refused and self._frames):
+            return FAILED
+        return DONE if self._frames else NOTHING
+
+    def _files(self) -> list[str]:
+        """Return every recording once, in the order given."""
+        files: dict[str, None] = {}
+        for path in self._paths:
+            try:
+                found = expand([path])
+            except (SourceError, OSError) as error:
+                self._fail(path, error)
+                continue
+            if found.missions:
+                skipped = plural(len(found.missions), "mission")
+                complain(f"{sentence(path)}: {skipped} skipped: not read yet")
+            if not found.recordings:
+                complain(f"{sentence(path)}: no recording in this directory")
+            files.update((str(each), None) for each in found.recordings)
+        return list(files)
+
+    def _one(self, path: str, progress: Progress) -> Iterator[Result]:
+        try:
+            with progress.of(path) as advance:
+                result, frames = self._read(path, advance)
+        except DialectError as error:
+            raise click.UsageError(sentence(str(error))) from error
+        except (SourceError, OSError) as error:
+            self._fail(path, error)
+            return
+        self._frames += frames
+        yield result
+
+    def _fail(self, path: str, error: SourceError | OSError) -> None:
+        """Say which file cannot be read and why; the message may name it already."""
+        if isinstance(error, NoRecordingError):
+            self._refused += 1
+        else:
+            self._unreadable += 1
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        complain(sentence(reason if path in reason else f"{path}: {reason}"))

@@ -1,0 +1,137 @@
+"""`mavframecheck inspect`: what the numbers of a recording mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+import click
+
+from mavframecheck.cli.output import echo, page_context
+from mavframecheck.report import Context
+from mavframecheck.report.escape import sentence
+
+if TYPE_CHECKING:
+    from mavframecheck.engine import Settings
+    from mavframecheck.model.survey import FileSurvey
+
+_KINDS = ("tlog", "raw", "pcap", "pcapng")
+_PIPE_WIDTH = 100
+"""Columns for a pipe: tables need more room than sentences."""
+
+
+@click.command()
+@click.argument("paths", metavar="LOG...", nargs=-1, required=True)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="text is for people; json is described in docs/output.md.",
+)
+@click.option(
+    "--message",
+    "messages",
+    metavar="NAME",
+    multiple=True,
+    help="Show only this message, with every field. Repeatable.",
+)
+@click.option(
+    "--all",
+    "every_field",
+    is_flag=True,
+    help="Show every field, not only those about place, attitude, time and frames.",
+)
+@click.option(
+    "--dialect",
+    metavar="NAME|FILE.xml",
+    default="ardupilotmega",
+    show_default=True,
+    help="MAVLink dialect of the recording.",
+)
+@click.option(
+    "--input-kind",
+    type=click.Choice(_KINDS),
+    help="Read files as this, whatever their content looks like.",
+)
+@click.pass_context
+def inspect(
+    ctx: click.Context,
+    /,
+    paths: tuple[str, ...],
+    form: str,
+    messages: tuple[str, ...],
+    every_field: bool,
+    dialect: str,
+    input_kind: str | None,
+) -> None:
+    """Show who sends what in a recording, and what each number means.
+
+    LOG is a file, a directory, or - for standard input. Per sender and message: rate, and for each
+    field its unit, frame, direction, height reference, clock, range and how much of it is missing.
+
+    Exit codes: 0 done, 2 wrong usage or a file that cannot be read, 3 nothing could be decoded.
+    """
+    from mavframecheck.engine import Settings
+
+    view = VIEWS["map"](Settings(dialect=dialect, input_kind=input_kind), messages)
+    context = page_context()
+    if not context.terminal:
+        context = context._replace(width=_PIPE_WIDTH)
+    ctx.exit(view.show(paths, form, context, every_field=every_field))
+
+
+class _Map:
+    """What each message means, field by field."""
+
+    def __init__(self, settings: Settings, messages: tuple[str, ...]) -> None:
+        self._settings = settings
+        self._messages = _known(messages, settings.dialect)
+
+    def show(
+        self, paths: tuple[str, ...], form: str, context: Context, *, every_field: bool
+    ) -> int:
+        """Write the map of each file; return the exit code."""
+        from mavframecheck.cli.files import Files
+        from mavframecheck.report.survey import render_json, render_text
+
+        files = Files(paths, self._read)
+        if form == "json":
+            echo(render_json(files.results(), context))
+        else:
+            every_field = every_field or bool(self._messages)
+            echo(render_text(files.results(), context, every_field=every_field))
+        return files.exit_code()
+
+    def _read(self, path: str, advance: Callable[[int], None] | None) -> tuple[FileSurvey, int]:
+        from mavframecheck.engine.survey import survey_file
+
+        survey = survey_file(path, self._settings, self._messages, advance)
+        return survey, survey.messages
+
+
+VIEWS = {"map": _Map}
+"""What `inspect` can show of a recording, by name."""
+
+
+def _known(messages: tuple[str, ...], dialect: str) -> tuple[str, ...]:
+    """Return message names as the dialect writes them; an unknown one is a usage error."""
+    if not messages:
+        return ()
+    from mavframecheck.wire import DialectError, load_dialect
+
+    try:
+        names = load_dialect(dialect).by_name
+    except DialectError as error:
+        raise click.UsageError(sentence(str(error))) from error
+    for message in messages:
+        if message.upper() not in names:
+            near = get_close_matches(message.upper(), names, n=3)
+            hint = f" Did you mean {' or '.join(near)}?" if near else ""
+            raise click.BadParameter(
+                f"the dialect has no message called {sentence(message)}.{hint}",
+                param_hint="--message",
+            )
+    return tuple(message.upper() for message in messages)

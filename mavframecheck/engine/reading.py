@@ -1,0 +1,115 @@
+"""Reading a recording from end to end: batches, and what is counted on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from mavframecheck.engine.settings import Settings
+from mavframecheck.model import Damage, Vehicle
+from mavframecheck.semantics.names import type_name
+from mavframecheck.sources import Recording
+from mavframecheck.vehicle import Context, Traffic
+from mavframecheck.vehicle.roles import version_text
+from mavframecheck.vehicle.traffic import MAX_SENDERS, MAX_STREAMS
+from mavframecheck.wire import Batch, Dialect, read_batches
+
+MAX_DAMAGE = 100
+"""Damaged ranges that a report lists; all are counted."""
+
+Progress = Callable[[int], None]
+
+
+class Reading:
+    """A recording on its way through: its batches, its context, and what was counted."""
+
+    def __init__(self, recording: Recording, settings: Settings, dialect: Dialect) -> None:
+        """Read `recording` with `dialect`, assuming what `settings` say."""
+        self.context = Context(settings.autopilot)
+        self.traffic = Traffic(dialect)
+        self.damage: list[Damage] = []
+        self.damage_total = 0
+        self.counts = {"messages": 0, "unknown": 0, "bad_crc": 0, "skipped_bytes": 0}
+        self._recording = recording
+        self._dialect = dialect
+        self._open: Damage | None = None
+
+    def batches(self, progress: Progress | None = None) -> Iterator[Batch]:
+        """Yield the batches of the recording; `progress` is told how many bytes were read so far."""
+        chunks = self._recording.chunks()
+        for batch in read_batches(chunks, self._dialect, stamped=self._recording.stamped):
+            self._count(batch)
+            admitted = self.traffic.admit(batch.frames)
+            if self.traffic.refused:
+                batch.restrict(admitted)
+            yield batch
+            if progress is not None and len(batch):
+                progress(int(batch.frames.offset[-1]))
+        self._close_damage()
+
+    def _count(self, batch: Batch) -> None:
+        """Count the frames of a batch, and join damaged ranges that touch."""
+        frames = batch.frames
+        self.counts["messages"] += int(np.count_nonzero(frames.good))
+        self.counts["unknown"] += int(np.count_nonzero(~frames.known))
+        self.counts["bad_crc"] += int(np.count_nonzero(frames.known & ~frames.crc_ok))
+        for damage in batch.damage:
+            self.counts["skipped_bytes"] += damage.length
+            last = self._open
+            if last is not None and last.offset + last.length == damage.offset:
+                length = last.length + damage.length
+                self._open = Damage(last.offset, length, last.reason)
+            else:
+                self._close_damage()
+                self._open = damage
+
+    def _close_damage(self) -> None:
+        if self._open is not None:
+            self.damage_total += 1
+            if len(self.damage) < MAX_DAMAGE:
+                self.damage.append(self._open)
+        self._open = None
+
+    def summary(self) -> dict[str, Any]:
+        """Return what every report says of a file, by the names of its struct's fields."""
+        return {
+            "path": self._recording.name,
+            "kind": str(self._recording.kind),
+            **self.counts,
+            "duration_s": self.traffic.duration_s,
+            "time_start": self.traffic.t_first,
+            "notes": tuple(self._notes()),
+        }
+
+    def _notes(self) -> Iterator[str]:
+        yield from self._recording.notes
+        if self.traffic.refused:
+            yield (
+                f"{self.traffic.refused} frames of further senders or streams were read but not "
+                f"judged: more than {MAX_SENDERS} senders or {MAX_STREAMS} streams"
+            )
+
+    def vehicles(self) -> tuple[Vehicle, ...]:
+        """Return every sender, with what it said it is."""
+        frames: dict[tuple[int, int], int] = {}
+        for stream in self.traffic.streams():
+            key = (stream.sysid, stream.compid)
+            frames[key] = frames.get(key, 0) + stream.frames
+        return tuple(self._vehicle(*sender, count) for sender, count in frames.items())
+
+    def _vehicle(self, sysid: int, compid: int, messages: int) -> Vehicle:
+        role = self.context.role(sysid * 256 + compid)
+        if role != "autopilot":
+            return Vehicle(sysid=sysid, compid=compid, role=role, messages=messages)
+        mav_type = self.context.last("vehicle.type", sysid)
+        return Vehicle(
+            sysid=sysid,
+            compid=compid,
+            role=role,
+            autopilot=self.context.last("vehicle.autopilot", sysid),
+            type=None if mav_type is None else type_name(int(mav_type)),
+            version=version_text(self.context.last("vehicle.version", sysid)),
+            messages=messages,
+        )
