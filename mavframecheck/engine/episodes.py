@@ -17,6 +17,8 @@ from mavframecheck.wire import Frames
 
 MAX_EPISODES = 50
 """Episodes per rule and stream; what comes after counts into the last one."""
+MAX_STREAMS = 4096
+"""Streams of one message in which a rule tells episodes apart; further ones are not reported."""
 GAP_US = 10_000_000
 """Hits further apart than this (us), with rows in between that were right, are two episodes."""
 
@@ -110,14 +112,13 @@ class Episodes:
         hits = np.flatnonzero(judged.hit)
         if not len(hits) and not streams:
             return
-        for stream in (
-            np.unique(np.concatenate((judged.stream[hits], list(streams))))
-            .astype(np.int64)
-            .tolist()
-        ):
+        fresh = [s for s in dict.fromkeys(judged.stream[hits].tolist()) if s not in streams]
+        for stream in fresh[: MAX_STREAMS - len(streams)]:
+            streams[stream] = _Stream()
+        for stream, episodes in streams.items():
             places = np.flatnonzero(judged.stream == stream)
             if len(places):
-                _extend(streams.setdefault(stream, _Stream()), rule, judged, places)
+                _extend(episodes, rule, judged, places)
 
     def observe(self, episode: Episode) -> None:
         """Add an episode that a Python check put together itself."""

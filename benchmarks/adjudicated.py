@@ -1,0 +1,72 @@
+"""`make accuracy`, second part: errors and warnings on real recordings, against what people confirmed.
+
+`expectations.toml` lists every error and warning on the real recordings with the reason why it is true,
+read from the bytes. One that it does not list is new: look at the bytes, then list it or mend the rule.
+"""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.corpus import Checked, check_all, check_arguments, is_absent
+
+EXPECTATIONS = Path(__file__).parent / "expectations.toml"
+FOLDERS = ("tlog", "raw", "pcap")
+
+
+class Key(NamedTuple):
+    """What tells findings on one recording apart."""
+
+    file: str
+    code: str
+    subject: str
+
+
+def confirmed() -> set[Key]:
+    """Return the findings that people confirmed."""
+    listed = tomllib.loads(EXPECTATIONS.read_text("utf-8"))["finding"]
+    return {Key(entry["file"], entry["code"], entry["subject"]) for entry in listed}
+
+
+def loud(checked: Checked, root: Path) -> set[Key]:
+    """Return the errors and warnings on a recording, and print those that nobody has looked at."""
+    file = checked.path.relative_to(root).as_posix()
+    if checked.failure:
+        print(f"failed        {file}  {checked.failure}")
+        return {Key(file, "failed", checked.failure)}
+    return {
+        Key(file, finding["code"], finding["subject"])
+        for finding in checked.findings
+        if finding["severity"] != "info"
+    }
+
+
+def main() -> int:
+    """Judge every real recording; 1 when a finding is not confirmed, or a confirmed one is gone."""
+    options = check_arguments(__doc__ or "").parse_args()
+    root = options.corpus / "real"
+    if is_absent(root):
+        return 0
+    paths = sorted(p for folder in FOLDERS for p in (root / folder).iterdir())
+    found: set[Key] = set()
+    for checked in check_all(paths, options):
+        found |= loud(checked, root)
+    known = confirmed()
+    for word, keys in (("unconfirmed", found - known), ("gone", known - found)):
+        for key in sorted(keys):
+            print(f"{word:14}{key.file}  {key.code} {key.subject}".rstrip())
+    by_code = Counter(key.code for key in found & known)
+    said = ", ".join(f"{code} on {count}" for code, count in sorted(by_code.items()))
+    print(
+        f"\n{len(paths)} real recordings: {len(found & known)} confirmed ({said}), "
+        f"{len(found - known)} unconfirmed, {len(known - found)} gone"
+    )
+    return int(found != known)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
