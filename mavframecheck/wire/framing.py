@@ -208,7 +208,8 @@ class _Walk:
         c = self.candidates
         self._check(np.flatnonzero(c.known & self.followed))
         after = self.successor
-        certain = c.good | (~c.known & self.followed & (after >= 0) & c.good[after])
+        leads_on = (after >= 0) & (c.good[after] | self.followed[after])
+        certain = c.good | (self.followed & leads_on)
         unchecked = np.flatnonzero(certain & ~c.good)
         certain[unchecked] = ~np.any(self._overlaps(unchecked), axis=0)
         return certain
