@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import functools
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ import msgspec
 
 from mavframecheck.engine.expression import ANY_NAME, Expression, ExpressionError
 from mavframecheck.engine.template import Template
-from mavframecheck.model import Rule
+from mavframecheck.model import Rule, Severity
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.commands import location_commands
 from mavframecheck.semantics.constants import constant
@@ -30,39 +31,103 @@ class RuleFileError(Exception):
 
 
 class CompiledRule:
-    """A rule with its expressions compiled and its parameters fixed."""
+    """A rule with its parameters fixed; each of its texts is compiled when it is first needed.
 
-    def __init__(self, rule: Rule, params: Mapping[str, Any], source: str) -> None:
-        """Compile `rule` from the file `source` with `params` in place of its own."""
+    A recording is about a few of many rules, and compiling all of them would cost more than judging it.
+    """
+
+    def __init__(
+        self,
+        rule: Rule,
+        params: Mapping[str, Any],
+        source: str,
+        binds: Collection[str] | None = None,
+    ) -> None:
+        """Take `rule` from the file `source` with `params` in place of its own.
+
+        `binds` are the messages that it can be about, where that was worked out before.
+        """
         self.rule = rule
         self.params = {**rule.params, **params}
         self._source = source
+        self._binds = binds
         self.messages = Choice(rule.applies.message)
         self.criteria = [(name, Choice(value)) for name, value in rule.applies.tag.items()]
         self.senders = Choice(rule.applies.sender)
         self.autopilots = Choice(rule.applies.autopilot)
+
+    def validate(self) -> None:
+        """Compile everything; RuleFileError names file, key and column of what cannot be."""
+        _ = self.awaited, self.judged_by
+
+    def may_judge(self, message: str) -> bool:
+        """Return whether the rule can be about a message."""
+        return message in self._binds if self._binds is not None else bool(bind(self, message))
+
+    @functools.cached_property
+    def lets(self) -> dict[str, Expression]:
+        """Named expressions, in order: each may use those before it."""
         names = frozenset(self.params) | OWN_NAMES
-        self.lets: dict[str, Expression] = {}
-        for name, code in rule.let.items():
-            self.lets[name] = self._expression(code, names, f"let.{name}")
+        lets: dict[str, Expression] = {}
+        for name, code in self.rule.let.items():
+            lets[name] = self._expression(code, names, f"let.{name}")
             names |= {name}
-        self.when = self._expression(rule.detect.when, names, "detect.when")
-        self.flag = self._expression(rule.detect.flag, names, "detect.flag")
-        self.worst = self._expression(rule.detect.worst, names, "detect.worst")
-        if rule.detect.check:
-            names |= {ANY_NAME}
-        self.severities = [
-            (self._expression(case.condition, names, f"severity_when[{k}]"), case.severity)
-            for k, case in enumerate(rule.severity_when)
-        ]
-        self.text = self._template(rule.explain.text, names, "explain.text")
-        self.fix = self._template(rule.explain.fix, names, "explain.fix")
-        self.evidence = {
-            key: self._template(text, names, f"evidence.{key}")
-            for key, text in rule.evidence.items()
-        }
+        return lets
 
     @property
+    def _names(self) -> frozenset[str]:
+        return frozenset(self.params) | OWN_NAMES | frozenset(self.lets)
+
+    @property
+    def _text_names(self) -> frozenset[str]:
+        return self._names | {ANY_NAME} if self.rule.detect.check else self._names
+
+    @functools.cached_property
+    def when(self) -> Expression | None:
+        """Which rows are judged."""
+        code = self.rule.detect.when
+        return self._expression(code, self._names, "detect.when") if code else None
+
+    @functools.cached_property
+    def flag(self) -> Expression:
+        """Which judged rows are wrong; none by itself where a Python check looks."""
+        return self._expression(self.rule.detect.flag or "False", self._names, "detect.flag")
+
+    @functools.cached_property
+    def worst(self) -> Expression | None:
+        """How bad a row is."""
+        code = self.rule.detect.worst
+        return self._expression(code, self._names, "detect.worst") if code else None
+
+    @functools.cached_property
+    def severities(self) -> list[tuple[Expression, Severity]]:
+        """Conditions for another severity, the first that holds wins."""
+        return [
+            (
+                self._expression(case.condition, self._text_names, f"severity_when[{k}]"),
+                case.severity,
+            )
+            for k, case in enumerate(self.rule.severity_when)
+        ]
+
+    @functools.cached_property
+    def text(self) -> Template:
+        """What is wrong."""
+        return self._template(self.rule.explain.text, "explain.text")
+
+    @functools.cached_property
+    def fix(self) -> Template:
+        """How to mend it."""
+        return self._template(self.rule.explain.fix, "explain.fix")
+
+    @functools.cached_property
+    def evidence(self) -> dict[str, Template]:
+        """Typed evidence by key."""
+        return {
+            key: self._template(text, f"evidence.{key}") for key, text in self.rule.evidence.items()
+        }
+
+    @functools.cached_property
     def required(self) -> frozenset[str]:
         """Context that a row must have before it is judged.
 
@@ -76,12 +141,12 @@ class CompiledRule:
         together = {history for sources in tested for history, _ in sources}
         return frozenset(n for n in found - ALWAYS_KNOWN if NAMES[n].sources[0][0] not in together)
 
-    @property
+    @functools.cached_property
     def judged_by(self) -> frozenset[str]:
         """All context that decides whether a row is judged, and how."""
         return (self.required | self._contexts(self.when)) - ALWAYS_KNOWN
 
-    @property
+    @functools.cached_property
     def awaited(self) -> frozenset[str]:
         """Context worth waiting for: what judging, severity and words speak of."""
         spoken = [condition for condition, _ in self.severities]
@@ -101,18 +166,16 @@ class CompiledRule:
         named = [self.lets[name] for name in expression.used_names if name in self.lets]
         return [expression, *(part for each in named for part in self._with_lets(each))]
 
-    def _expression(self, code: str, names: frozenset[str], key: str) -> Any:
-        if not code:
-            return None
+    def _expression(self, code: str, names: frozenset[str], key: str) -> Expression:
         try:
             return Expression(code, names)
         except ExpressionError as error:
             message = f"{self._source}: {key}, column {error.column}: {error}"
             raise RuleFileError(message) from error
 
-    def _template(self, text: str, names: frozenset[str], key: str) -> Template:
+    def _template(self, text: str, key: str) -> Template:
         try:
-            return Template(text, names)
+            return Template(text, self._text_names)
         except ExpressionError as error:
             message = f"{self._source}: {key}, column {error.column}: {error}"
             raise RuleFileError(message) from error
@@ -159,6 +222,12 @@ def bind(rule: CompiledRule, message: str) -> tuple[Binding, ...]:
         conditions = tuple(_row_conditions(rule.rule, message, None))
         return (Binding(rule, message, None, {}, conditions),) if applies.message else ()
     return tuple(_bind_tags(rule, message))
+
+
+def bound_messages(rule: CompiledRule) -> tuple[str, ...]:
+    """Return every message that a rule can be about, sorted."""
+    named = {name for name in rule.rule.applies.message if not name.startswith("!")}
+    return tuple(sorted(m for m in {*catalogue.messages(), *named} if bind(rule, m)))
 
 
 def _bind_tags(rule: CompiledRule, message: str) -> Iterator[Binding]:
@@ -224,6 +293,8 @@ class Pack(msgspec.Struct, frozen=True):
 
     rules: tuple[Rule, ...]
     sources: dict[str, str] = {}
+    binds: dict[str, tuple[str, ...]] = {}
+    """Code to the messages that the rule can be about, worked out when the pack was compiled."""
 
     @property
     def by_code(self) -> dict[str, Rule]:

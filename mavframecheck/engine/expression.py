@@ -18,7 +18,7 @@ from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import NAMES
 
 MAX_LENGTH = 2000
-OF_STACK = frozenset({"does", "does_surely", "answer_to", "note_on", "reference"})
+OF_STACK = frozenset({"does", "does_surely", "answer_to", "note_on", "takes", "reference"})
 """Functions of a field that read the acceptance data."""
 NEEDED = frozenset({"vehicle.autopilot", "vehicle.version"})
 """Context that those, and stack(), read."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mavframecheck.geo.geodesy import bearing_deg, distance_m
+from mavframecheck.semantics.names import FAMILY_NAMES
 
 FIELD_FUNCTIONS = frozenset(
     {
@@ -29,6 +30,7 @@ FIELD_FUNCTIONS = frozenset(
         "does_surely",
         "answer_to",
         "note_on",
+        "takes",
         "reference",
         "groups_used",
         "used_zero",
@@ -45,13 +47,13 @@ fields); diagonal: (n, k) variances of a covariance; correlation: (n,) the large
 covariance, above 1 when it is none; words: for texts, what a mask, frame or enumeration value means.
 Of the field that holds the MAV_FRAME, by what the autopilot that the row is about does with it (acceptance
 data): does: obeyed, misread, refused, ignored, stops or unknown; does_surely: whether every version that could
-be meant does so; answer_to: what it says; note_on: what there is to know.
+be meant does so; answer_to: what it says; note_on: what there is to know; takes: the frames that it obeys.
 reference: what a height is measured from, in the words of `AltRef` (msl, home, terrain, ellipsoid...): by its
 catalogue entry, by the selector in the same row, else by what the autopilot takes it for.
 Of a mask: groups_used: how many groups of fields it lets count (position, velocity, rates...); used_zero:
 whether all that it lets count is exactly zero; ignored_given: whether it ignores groups as a whole and each of
 them holds something.
-Instead of a field, does, does_surely, answer_to and note_on take ``message`` where a message has no frame.
+Instead of a field, does, does_surely, answer_to, note_on and takes take ``message`` where a message has no frame.
 """
 
 
@@ -63,6 +65,13 @@ def some(column: Any) -> Any:
 def every(column: Any) -> Any:
     """Return (n,) whether all elements of each row of an array field hold."""
     return np.all(column, axis=-1)
+
+
+def extent(column: Any) -> Any:
+    """Return (n,) how many elements of each row there are up to the last one that holds."""
+    column = np.asarray(column)
+    from_the_end = np.argmax(column[..., ::-1], axis=-1)
+    return np.where(np.any(column, axis=-1), column.shape[-1] - from_the_end, 0)
 
 
 def smallest(column: Any) -> Any:
@@ -114,6 +123,12 @@ def wrap_pi(angle: Any) -> Any:
     return np.arctan2(np.sin(angle), np.cos(angle))
 
 
+def called(family: Any) -> Any:
+    """Return what people call an autopilot family (``PX4``); ``the autopilot`` where it is not known."""
+    names = [FAMILY_NAMES.get(word, "the autopilot") for word in np.ravel(family).tolist()]
+    return np.array(names).reshape(np.shape(family))
+
+
 def fixed(value: Any, digits: int) -> Any:
     """Return numbers as texts with `digits` decimals, for texts of findings."""
     flat = [f"{number:.{int(digits)}f}" for number in np.ravel(value).tolist()]
@@ -137,6 +152,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "isfinite": np.isfinite,
     "some": some,
     "every": every,
+    "extent": extent,
     "smallest": smallest,
     "norm": norm,
     "distance_m": distance_m,
@@ -144,6 +160,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "undulation": undulation,
     "outside": outside,
     "least": least,
+    "called": called,
     "fixed": fixed,
     "float32_step": float32_step,
     "power_of_ten": power_of_ten,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import importlib.resources
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 
 import msgspec
 
 from mavframecheck.checks import load_check
-from mavframecheck.engine.compiled import CompiledRule, Pack, RuleFileError
+from mavframecheck.engine.compiled import CompiledRule, Pack, RuleFileError, bound_messages
 from mavframecheck.engine.settings import Settings
 from mavframecheck.model import Rule
 
@@ -25,7 +25,10 @@ def load_pack(directories: Sequence[Path] = ()) -> Pack:
     packed = importlib.resources.files(__package__).joinpath(COMPILED).read_bytes()
     shipped = msgspec.json.decode(packed, type=Pack)
     own = [read_rule(file) for folder in directories for file in rule_files(folder)]
-    return _pack([*((rule, shipped.sources[rule.code]) for rule in shipped.rules), *own])
+    if not own:
+        return shipped
+    pack = _pack([*((rule, shipped.sources[rule.code]) for rule in shipped.rules), *own])
+    return msgspec.structs.replace(pack, binds=shipped.binds)
 
 
 def source_folder() -> Path:
@@ -59,11 +62,16 @@ def read_rule(file: Path) -> tuple[Rule, str]:
     except msgspec.ValidationError as error:
         message = f"{file}: {error}"
         raise RuleFileError(message) from error
-    compile_rule(rule, {}, str(file))
+    compile_rule(rule, {}, str(file)).validate()
     return rule, str(file)
 
 
-def compile_rule(rule: Rule, params: dict[str, float | str | bool], source: str) -> CompiledRule:
+def compile_rule(
+    rule: Rule,
+    params: dict[str, float | str | bool],
+    source: str,
+    binds: Collection[str] | None = None,
+) -> CompiledRule:
     """Return `rule` ready to run; RuleFileError when it has no, or two, ways to detect."""
     if bool(rule.detect.flag) == bool(rule.detect.check):
         message = f"{source}: detect needs either flag or check"
@@ -77,13 +85,18 @@ def compile_rule(rule: Rule, params: dict[str, float | str | bool], source: str)
     elif not (rule.applies.message or rule.applies.tag):
         message = f"{source}: applies needs message or tag"
         raise RuleFileError(message)
-    return CompiledRule(rule, params, source)
+    return CompiledRule(rule, params, source, binds)
 
 
 def chosen_rules(pack: Pack, settings: Settings) -> list[CompiledRule]:
     """Return the rules of `pack` that `settings` let run, compiled."""
     return [
-        compile_rule(rule, settings.overrides.get(rule.code, {}), pack.sources[rule.code])
+        compile_rule(
+            rule,
+            settings.overrides.get(rule.code, {}),
+            pack.sources[rule.code],
+            pack.binds.get(rule.code),
+        )
         for rule in pack.rules
         if _runs(rule, settings)
     ]
@@ -101,13 +114,11 @@ def compiled_pack() -> bytes:
     folder = source_folder()
     read = [read_rule(file) for file in rule_files(folder)]
     pack = _pack((rule, Path(file).relative_to(folder).as_posix()) for rule, file in read)
+    binds = {rule.code: bound_messages(compile_rule(rule, {}, "")) for rule in pack.rules}
     rules = b",\n".join(msgspec.json.encode(rule) for rule in pack.rules)
+    sources, messages = (msgspec.json.encode(d, order="sorted") for d in (pack.sources, binds))
     return (
-        b'{"rules":[\n'
-        + rules
-        + b'\n],"sources":'
-        + msgspec.json.encode(pack.sources, order="sorted")
-        + b"}\n"
+        b'{"rules":[\n' + rules + b'\n],"sources":' + sources + b',\n"binds":' + messages + b"}\n"
     )
 
 

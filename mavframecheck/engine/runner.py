@@ -36,8 +36,39 @@ class _Desk:
     """The bindings on one message that need the same context, and the rows that wait for it."""
 
     queue: Queue
-    senders: Choice
     rules: list[tuple[CompiledRule, str | None, list[Binding]]]
+
+
+class _Hall:
+    """The rules on one message that listen to the same senders; its desks open with the first row."""
+
+    def __init__(self, message: str, senders: Choice) -> None:
+        self._message = message
+        self._senders = senders
+        self.rules: list[CompiledRule] = []
+        self.desks: list[_Desk] = []
+
+    def admit(self, rows: Rows | None) -> Rows | None:
+        """Return the rows of the senders that count, None when there is none."""
+        if rows is None:
+            return None
+        speaks = _among(rows, "sender.role", self._senders)
+        if not speaks.any():
+            return None
+        if not self.desks:
+            self._open()
+        return rows if speaks.all() else rows.take(speaks)
+
+    def _open(self) -> None:
+        desks: dict[tuple[str, ...], _Desk] = {}
+        for rule in self.rules:
+            labelled: dict[str | None, list[Binding]] = {}
+            for binding in bind(rule, self._message):
+                labelled.setdefault(binding.label, []).append(binding)
+            names = tuple(sorted(rule.awaited))
+            desk = desks.setdefault(names, _Desk(Queue(names), []))
+            desk.rules += [(rule, label, bindings) for label, bindings in labelled.items()]
+        self.desks = list(desks.values())
 
 
 class Runner:
@@ -55,29 +86,30 @@ class Runner:
         ]
         self._context = context
         self._episodes = Episodes(file)
-        self._desks: dict[str, list[_Desk]] = {}
+        self._halls: dict[str, list[_Hall]] = {}
         self._tallies = {rule.rule.code: _Tally() for rule in self._rules}
 
     def update(self, batch: Batch) -> None:
         """Judge the rows of a batch, and those that waited for what it says."""
         self._context.update(batch)
-        for message in {**dict.fromkeys(batch.tables), **dict.fromkeys(self._desks)}:
-            desks = self._desks_for(message)
-            if not desks:
+        for message in {**dict.fromkeys(batch.tables), **dict.fromkeys(self._halls)}:
+            halls = self._halls_for(message)
+            if not halls:
                 continue
             table = batch.tables.get(message)
             rows = None if table is None else Rows(table, self._context)
-            for desk in desks:
-                self._serve(desk, rows, batch)
+            for hall in halls:
+                admitted = hall.admit(rows)
+                for desk in hall.desks:
+                    self._serve(desk, admitted, batch)
         for _, check in self._checks:
             check.update(batch, self._context)
         self._context.settle()
 
     def finish(self) -> tuple[list[Finding], list[RuleRun]]:
         """Return all findings, and how each rule ended."""
-        for desks in self._desks.values():
-            for desk in desks:
-                self._judge_late(desk, desk.queue.close())
+        for desk in (desk for halls in self._halls.values() for h in halls for desk in h.desks):
+            self._judge_late(desk, desk.queue.close())
         runs = [self._run_of(rule) for rule in self._rules]
         for rule, check in self._checks:
             runs.append(_verdict_of(rule, check))
@@ -85,26 +117,19 @@ class Runner:
                 self._episodes.observe(_episode(rule, observation))
         return self._episodes.findings(), sorted(runs, key=lambda run: run.code)
 
-    def _desks_for(self, message: str) -> list[_Desk]:
-        """Bind every rule to a message that is seen for the first time."""
-        if message not in self._desks:
-            desks: dict[tuple[tuple[str, ...], ...], _Desk] = {}
+    def _halls_for(self, message: str) -> list[_Hall]:
+        """Return the rules on a message by whom they listen to."""
+        if message not in self._halls:
+            halls: dict[tuple[str, ...], _Hall] = {}
             for rule in self._rules:
-                labelled: dict[str | None, list[Binding]] = {}
-                for binding in bind(rule, message):
-                    labelled.setdefault(binding.label, []).append(binding)
-                if labelled:
-                    names, senders = tuple(sorted(rule.awaited)), rule.rule.applies.sender
-                    desk = desks.setdefault((names, senders), _Desk(Queue(names), rule.senders, []))
-                    desk.rules += [(rule, label, bindings) for label, bindings in labelled.items()]
-            self._desks[message] = list(desks.values())
-        return self._desks[message]
+                if rule.may_judge(message):
+                    senders = rule.rule.applies.sender
+                    hall = halls.setdefault(senders, _Hall(message, rule.senders))
+                    hall.rules.append(rule)
+            self._halls[message] = list(halls.values())
+        return self._halls[message]
 
     def _serve(self, desk: _Desk, rows: Rows | None, batch: Batch) -> None:
-        if rows is not None:
-            speaks = _among(rows, "sender.role", desk.senders)
-            if not speaks.all():
-                rows = rows.take(speaks)
         if desk.queue.names:
             released = desk.queue.offer(rows, batch.frames)
             self._judge_late(desk, released.late)

@@ -25,6 +25,8 @@ class RuleScope:
 
     def field(self, function: str, name: str) -> Any:
         """Return ``function(name)`` as a column; RuleFileError when the message has no such field."""
+        if function == "takes":
+            return stacks.taken(self.rows, self.binding.message)
         if function in _OF_STACK and name == "message":
             return stacks.verdicts(self.rows, self.binding.message, "", _OF_STACK[function])
         field, tag = self.binding.resolve(name)
@@ -101,7 +103,7 @@ class ValueScope:
         """Facts are unknown here."""
         raise RuleFileError(f"stack({key!r}) cannot be used in the texts of a Python check")
 
-    def listed(self, key: str, values: Any) -> Any:
+    def listed(self, key: str, _: Any) -> Any:
         """Facts are unknown here."""
         raise RuleFileError(f"listed({key!r}) cannot be used in the texts of a Python check")
 

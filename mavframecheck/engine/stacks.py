@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from mavframecheck.engine.rows import Rows
 from mavframecheck.semantics import acceptance
+from mavframecheck.semantics.constants import entry_name
 from mavframecheck.semantics.enums import AltRef
 from mavframecheck.semantics.tags import FieldTag
 
@@ -23,9 +24,21 @@ def verdicts(
     frames = rows.raw(field) if field else np.zeros(len(rows), np.int64)
 
     def of(family: str, version: float, command: int | None, frame: int) -> Any:
-        return pick(acceptance.accepts(family, message, frame, command, version))
+        picked = pick(acceptance.accepts(family, message, frame, command, version))
+        return picked.replace("%u", str(frame)) if isinstance(picked, str) else picked
 
     return _column(rows, frames, of)
+
+
+def taken(rows: Rows, message: str) -> Any:
+    """Return (n,) the frames that the autopilot of each row obeys in the message, in words."""
+
+    def of(family: str, version: float, command: int | None, _: int) -> str:
+        table = enumerate(acceptance.verdicts(family, message, command, version))
+        obeyed = [f for f, verdict in table if verdict.consequence is acceptance.Consequence.OBEYED]
+        return ", ".join(f"{entry_name('MAV_FRAME', f)} ({f})" for f in obeyed)
+
+    return _column(rows, np.zeros(len(rows), np.int64), of)
 
 
 def facts(rows: Rows, message: str, key: str) -> Any:

@@ -66,7 +66,4 @@ def _too_old(rows: Rows, now: Frames, patience_us: int) -> np.typing.NDArray[np.
         return np.zeros(len(rows), np.bool_)
     frames = rows.table.frames
     old = now.number[-1] - frames.number > LATE_FRAMES
-    timed = np.flatnonzero(now.t_valid)
-    if len(timed):
-        old |= frames.t_valid & (now.t_us[timed[-1]] - frames.t_us > patience_us)
-    return np.asarray(old)
+    return np.asarray(old | (now.clock_us[-1] - frames.clock_us > patience_us))

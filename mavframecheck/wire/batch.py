@@ -18,13 +18,19 @@ from mavframecheck.wire.table import Tables
 class Batch:
     """Some frames of a recording, the tables they decode to, and the damage found on the way."""
 
-    def __init__(self, scans: list[Scan], first: int, dialect: Dialect) -> None:
-        """Put the `scans` of all flows in order; `first` is the running number of the first frame."""
+    def __init__(
+        self, scans: list[Scan], dialect: Dialect, first: int = 0, clock_us: int = 0
+    ) -> None:
+        """Put the `scans` of all flows in order; `first` and `clock_us` go on from the batch before."""
         self.damage: list[Damage] = sorted(
             (d for s in scans for d in s.damage), key=lambda d: d.offset
         )
         self.buffer, self.frames = _merge(scans)
-        self.frames.number = np.arange(first, first + len(self.frames))
+        frames = self.frames
+        frames.number = np.arange(first, first + len(frames))
+        frames.clock_us = np.maximum.accumulate(
+            np.maximum(np.where(frames.t_valid, frames.t_us, 0), clock_us)
+        )
         self.layouts = dialect.layouts
 
     def __len__(self) -> int:
@@ -64,14 +70,16 @@ def read_batches(
     `stamped` says that an 8-byte stamp precedes each frame, as in a tlog.
     """
     framers: dict[int, Framer] = {}
-    first = 0
+    first = clock_us = 0
     for group in chunks:
         scans = []
         for chunk in group:
             framer = framers.setdefault(chunk.flow, Framer(dialect, stamped=stamped))
             scans.append(framer.feed(chunk))
-        batch = Batch(scans, first, dialect)
+        batch = Batch(scans, dialect, first, clock_us)
         first += len(batch)
+        clock_us = int(batch.frames.clock_us[-1]) if len(batch) else clock_us
         yield batch
     if framers:
-        yield Batch([framer.feed(None) for framer in framers.values()], first, dialect)
+        scans = [framer.feed(None) for framer in framers.values()]
+        yield Batch(scans, dialect, first, clock_us)

@@ -50,6 +50,8 @@ class Frames:
     """As received."""
     number: Ints
     """Running number of the frame in the whole stream: the order that context is joined by."""
+    clock_us: Ints
+    """Latest `t_us` that could be believed so far: the time of the recording, which never goes back."""
 
     def __len__(self) -> int:
         """Return the number of frames."""

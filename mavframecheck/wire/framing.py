@@ -111,6 +111,7 @@ class Framer:
             crc_ok=c.good[rows],
             checksum=octets[tail] | octets[tail + 1].astype(np.uint16) << 8,
             number=np.zeros(len(rows), np.int64),
+            clock_us=np.zeros(len(rows), np.int64),
         )
 
     def _receive_times(

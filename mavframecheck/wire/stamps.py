@@ -6,6 +6,8 @@ must not enter a duration, rate, gap or fit.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from mavframecheck.wire.frames import Bools, Ints
@@ -44,9 +46,9 @@ class Stamps:
             ([stamps[0] if self._previous is None else self._previous], stamps[:-1])
         )
         breaks = np.flatnonzero(np.abs(stamps - before) > TEAR_US)
-        edges = np.unique(np.concatenate(([0], breaks, [len(stamps)])))
+        edges = sorted({0, *breaks.tolist(), len(stamps)})
         torn = set(breaks.tolist())
-        for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        for first, last in itertools.pairwise(edges):
             if first in torn:
                 self._begin_run(int(stamps[first]))
             believed = self._believe(stamps[first:last])
