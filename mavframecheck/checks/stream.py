@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
-from mavframecheck.model import Damage, Subject
+from mavframecheck.model import Damage, Scalar, Subject
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Frames
+from mavframecheck.wire import Batch, Dialect, Frames
 from mavframecheck.wire.frames import STAMP
 from mavframecheck.wire.framing import CUT_OFF
+
+MAX_COUNTERS = 256
+"""Senders whose counters are followed."""
+MAX_IDS = 1000
+"""Unknown ids that are told apart."""
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -37,23 +43,23 @@ class _Span:
         self.count += len(found)
 
     def observation(
-        self, subject: Subject, count: int | None = None, **values: object
+        self, subject: Subject, count: int | None = None, **values: Scalar
     ) -> Iterator[Observation]:
         """Yield an observation, if there was anything."""
         if self.first is not None and self.last is not None:
-            yield Observation(subject, self.first, self.last, count or self.count, values)  # type: ignore[arg-type]
+            yield Observation(subject, self.first, self.last, count or self.count, values)
 
 
 class ChecksumFailures(Check):
     """Frames of known messages whose checksum fails, with a record right behind them."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Count nothing yet."""
-        super().__init__(*args)  # type: ignore[arg-type]
+        super().__init__(params, dialect)
         self._span = _Span()
         self._known = 0
         self._failed: Counter[int] = Counter()
-        self._held: Counter[int] = Counter()
+        self._held: set[str] = set()
 
     def update(self, batch: Batch, _context: Context) -> None:
         """Count the frames whose checksum holds and fails, by message id."""
@@ -62,29 +68,24 @@ class ChecksumFailures(Check):
         self._known += int(np.count_nonzero(frames.known))
         self._span.add(frames, failed)
         self._failed.update(frames.msgid[failed].tolist())
-        if self._failed:
-            ids = np.fromiter(self._failed, np.int32)
-            self._held.update(frames.msgid[frames.crc_ok & np.isin(frames.msgid, ids)].tolist())
+        self._held.update(batch.tables)
 
     def finish(self) -> Iterable[Observation]:
         """Return one observation for the whole recording."""
-        always = [
-            i
-            for i, n in self._failed.items()
-            if n >= self.params["min_always"] and not self._held[i]
-        ]
-        names = [self.dialect.layouts[msgid].name for msgid, _ in self._failed.most_common(5)]
+        failed = {self.dialect.layouts[i].name: n for i, n in self._failed.most_common()}
+        enough = self.params["min_always"]
+        always = [name for name, n in failed.items() if n >= enough and name not in self._held]
         hint = ""
         if always:
             hint = (
-                f" {', '.join(self.dialect.layouts[i].name for i in always)} never has a good checksum: its sender "
-                "uses another definition of the message (--dialect tells which)."
+                f" {', '.join(always)} never has a good checksum: its sender uses another "
+                "definition of the message (--dialect tells which)."
             )
         return self._span.observation(
             Subject(),
             frames=self._span.count,
             share=self._span.count / max(self._known, 1),
-            messages=", ".join(names),
+            messages=", ".join(list(failed)[:5]),
             hint=hint,
         )
 
@@ -96,14 +97,16 @@ class ChecksumFailures(Check):
 class StrayBytes(Check):
     """Byte ranges that hold no frame."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Count nothing yet."""
-        super().__init__(*args)  # type: ignore[arg-type]
+        super().__init__(params, dialect)
         self._frames = 0
         self._before: Place | None = None
         self._first: Place | None = None
         self._last: Place | None = None
         self._open: Damage | None = None
+        self._opened: Place | None = None
+        """The frame before the open range."""
         self._ranges = 0
         self._bytes = 0
         self._end = 0
@@ -112,29 +115,27 @@ class StrayBytes(Check):
         """Count damaged ranges; ranges that touch are one."""
         frames = batch.frames
         for damage in batch.damage:
-            if self._open is not None and self._open.offset + self._open.length == damage.offset:
-                self._open = Damage(
-                    self._open.offset, self._open.length + damage.length, self._open.reason
-                )
+            joined = self._open
+            if joined is not None and joined.offset + joined.length == damage.offset:
+                length = joined.length + damage.length
+                self._open = Damage(joined.offset, length, joined.reason)
             else:
                 self._close()
+                row = int(np.searchsorted(frames.offset, damage.offset)) - 1
                 self._open = damage
-            self._last = self._place(damage, frames)
-            self._first = self._first or self._last
+                self._opened = place(frames, row) if row >= 0 else self._before
         if len(frames):
             self._frames += len(frames)
             self._before = place(frames, len(frames) - 1)
             self._end = max(self._end, self._before.offset + self._before.size)
 
-    def _place(self, damage: Damage, frames: Frames) -> Place:
-        """Return a damaged range with the number and time of the frame before it."""
-        row = int(np.searchsorted(frames.offset, damage.offset)) - 1
-        before = place(frames, row) if row >= 0 else self._before
-        number, t_us = (before.number, before.t_us) if before is not None else (0, None)
-        return Place(number, t_us, damage.offset, damage.length)
-
     def _close(self) -> None:
+        """Take the open range as finished, placed by the number and time of the frame before it."""
         if self._open is not None:
+            before = self._opened
+            number, t_us = (before.number, before.t_us) if before is not None else (0, None)
+            self._last = Place(number, t_us, self._open.offset, self._open.length)
+            self._first = self._first or self._last
             self._ranges += 1
             self._bytes += self._open.length
         self._open = None
@@ -162,9 +163,9 @@ class StrayBytes(Check):
 class UnknownIds(Check):
     """Frames whose message id the dialect lacks."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Count nothing yet."""
-        super().__init__(*args)  # type: ignore[arg-type]
+        super().__init__(params, dialect)
         self._span = _Span()
         self._frames = 0
         self._ids: Counter[int] = Counter()
@@ -174,7 +175,12 @@ class UnknownIds(Check):
         unknown = ~batch.frames.known
         self._frames += len(batch.frames)
         self._span.add(batch.frames, unknown)
-        self._ids.update(batch.frames.msgid[unknown].tolist())
+        ids, first, counts = np.unique(
+            batch.frames.msgid[unknown], return_index=True, return_counts=True
+        )
+        for k in np.argsort(first).tolist():
+            if int(ids[k]) in self._ids or len(self._ids) < MAX_IDS:
+                self._ids[int(ids[k])] += int(counts[k])
 
     def finish(self) -> Iterable[Observation]:
         """Return one observation for the whole recording."""
@@ -191,9 +197,9 @@ class UnknownIds(Check):
 class LostFrames(Check):
     """Gaps in the sequence counter of a sender."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no sender yet."""
-        super().__init__(*args)  # type: ignore[arg-type]
+        super().__init__(params, dialect)
         self._last: dict[int, int] = {}
         self._received: Counter[int] = Counter()
         self._lost: Counter[int] = Counter()
@@ -208,11 +214,10 @@ class LostFrames(Check):
         sender = frames.sender[rows]
         order = np.argsort(sender.astype(np.uint16), kind="stable")
         edges = np.flatnonzero(np.diff(sender[order])) + 1
-        for group in np.split(rows[order], edges):
-            if len(group):
-                self._follow(
-                    int(frames.sysid[group[0]]) * 256 + int(frames.compid[group[0]]), frames, group
-                )
+        groups = [group for group in np.split(rows[order], edges) if len(group)]
+        for group in sorted(groups, key=lambda group: int(group[0])):
+            first = int(group[0])
+            self._follow(int(frames.sysid[first]) << 8 | int(frames.compid[first]), frames, group)
 
     def _follow(self, sender: int, frames: Frames, rows: Ints) -> None:
         if sender not in self._last and len(self._last) >= MAX_COUNTERS:
@@ -264,9 +269,9 @@ class LostFrames(Check):
 class DuplicatedTraffic(Check):
     """The same frame twice within a short stretch: two links merged, or a routing loop."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Remember nothing yet."""
-        super().__init__(*args)  # type: ignore[arg-type]
+        super().__init__(params, dialect)
         self._recent: Ints = np.zeros(0, np.int64)
         self._recent_number: Ints = np.zeros(0, np.int64)
         self._frames: Counter[int] = Counter()
@@ -296,7 +301,7 @@ class DuplicatedTraffic(Check):
     def _count(self, frames: Frames, rows: Ints, repeated: Bools) -> None:
         for sysid, count in zip(*np.unique(frames.sysid[rows], return_counts=True), strict=True):
             self._frames[int(sysid)] += int(count)
-        for sysid in np.unique(frames.sysid[repeated]).tolist():
+        for sysid in np.flatnonzero(np.bincount(frames.sysid[repeated])).tolist():
             mine = repeated & (frames.sysid == sysid)
             self._twice[sysid] += int(np.count_nonzero(mine))
             self._spans.setdefault(sysid, _Span()).add(frames, mine)
@@ -321,7 +326,3 @@ def _suspects(keys: Ints) -> Ints:
     shared = np.zeros(2**20, np.bool_)
     shared[slot[owner[slot] != np.arange(len(keys))]] = True
     return np.flatnonzero(shared[slot])
-
-
-MAX_COUNTERS = 256
-"""Senders whose counters are followed."""
