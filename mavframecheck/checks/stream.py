@@ -12,7 +12,7 @@ import numpy.typing as npt
 from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
 from mavframecheck.model import Damage, Scalar, Subject
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Frames
+from mavframecheck.wire import Batch, Dialect, Frames, Ranges
 from mavframecheck.wire.frames import STAMP
 from mavframecheck.wire.framing import CUT_OFF
 
@@ -104,10 +104,10 @@ class StrayBytes(Check):
         self._before: Place | None = None
         self._first: Place | None = None
         self._last: Place | None = None
-        self._open: Damage | None = None
+        self._ranges = Ranges()
         self._opened: Place | None = None
         """The frame before the open range."""
-        self._ranges = 0
+        self._count = 0
         self._bytes = 0
         self._end = 0
 
@@ -115,45 +115,39 @@ class StrayBytes(Check):
         """Count damaged ranges; ranges that touch are one."""
         frames = batch.frames
         for damage in batch.damage:
-            joined = self._open
-            if joined is not None and joined.offset + joined.length == damage.offset:
-                length = joined.length + damage.length
-                self._open = Damage(joined.offset, length, joined.reason)
-            else:
-                self._close()
+            self._take(self._ranges.add([damage]))
+            if self._ranges.open is damage:
                 row = int(np.searchsorted(frames.offset, damage.offset)) - 1
-                self._open = damage
                 self._opened = place(frames, row) if row >= 0 else self._before
         if len(frames):
             self._frames += len(frames)
             self._before = place(frames, len(frames) - 1)
             self._end = max(self._end, self._before.offset + self._before.size)
 
-    def _close(self) -> None:
-        """Take the open range as finished, placed by the number and time of the frame before it."""
-        if self._open is not None:
+    def _take(self, ranges: Iterable[Damage]) -> None:
+        """Count complete ranges, placed by the number and time of the frame before them."""
+        for damage in ranges:
             before = self._opened
             number, t_us = (before.number, before.t_us) if before is not None else (0, None)
-            self._last = Place(number, t_us, self._open.offset, self._open.length)
+            self._last = Place(number, t_us, damage.offset, damage.length)
             self._first = self._first or self._last
-            self._ranges += 1
-            self._bytes += self._open.length
-        self._open = None
+            self._count += 1
+            self._bytes += damage.length
 
     def finish(self) -> Iterable[Observation]:
         """Return one observation for the whole recording."""
-        last_range = self._open
-        self._close()
+        last_range = self._ranges.open
+        self._take(self._ranges.close())
         if self._first is None or self._last is None:
             return
         torn = (
-            self._ranges == 1
+            self._count == 1
             and last_range is not None
             and last_range.offset >= self._end
             and (last_range.reason == CUT_OFF or last_range.length <= STAMP)
         )
-        values = {"ranges": self._ranges, "bytes": self._bytes, "only_torn_tail": torn}
-        yield Observation(Subject(), self._first, self._last, self._ranges, values)
+        values = {"ranges": self._count, "bytes": self._bytes, "only_torn_tail": torn}
+        yield Observation(Subject(), self._first, self._last, self._count, values)
 
     def verdict(self) -> Verdict:
         """Return the frames read."""

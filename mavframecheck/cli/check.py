@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mavframecheck.cli.options import load_rules, overrides, rules_option, selected
+from mavframecheck.cli.options import (
+    dialect_option,
+    input_kind_option,
+    load_rules,
+    overrides,
+    rules_option,
+    selected,
+)
 from mavframecheck.cli.output import echo, page_context
 from mavframecheck.model import Severity
 from mavframecheck.report import FORMATS, load
@@ -25,7 +32,6 @@ Give a recording, a directory of them, or - for standard input. For example:
 'mavframecheck check --help' lists every option.
 """
 _FAMILIES = ("px4", "arducopter", "arduplane", "ardurover", "ardusub")
-_KINDS = ("tlog", "raw", "pcap", "pcapng")
 
 
 @click.command()
@@ -58,18 +64,8 @@ _KINDS = ("tlog", "raw", "pcap", "pcapng")
     type=click.Choice(_FAMILIES),
     help="What the vehicle is, where the recording does not say.",
 )
-@click.option(
-    "--dialect",
-    metavar="NAME|FILE.xml",
-    default="ardupilotmega",
-    show_default=True,
-    help="MAVLink dialect of the recording.",
-)
-@click.option(
-    "--input-kind",
-    type=click.Choice(_KINDS),
-    help="Read files as this, whatever their content looks like.",
-)
+@dialect_option
+@input_kind_option
 @click.option(
     "--set",
     "assignments",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mavframecheck.cli.options import dialect_option, input_kind_option
 from mavframecheck.cli.output import echo, page_context
 from mavframecheck.report import Context
 from mavframecheck.report.escape import sentence
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from mavframecheck.engine import Settings
     from mavframecheck.model.survey import FileSurvey
 
-_KINDS = ("tlog", "raw", "pcap", "pcapng")
 _PIPE_WIDTH = 100
 """Columns for a pipe: tables need more room than sentences."""
 
@@ -44,18 +44,8 @@ _PIPE_WIDTH = 100
     is_flag=True,
     help="Show every field, not only those about place, attitude, time and frames.",
 )
-@click.option(
-    "--dialect",
-    metavar="NAME|FILE.xml",
-    default="ardupilotmega",
-    show_default=True,
-    help="MAVLink dialect of the recording.",
-)
-@click.option(
-    "--input-kind",
-    type=click.Choice(_KINDS),
-    help="Read files as this, whatever their content looks like.",
-)
+@dialect_option
+@input_kind_option
 @click.pass_context
 def inspect(
     ctx: click.Context,

@@ -27,6 +27,19 @@ rules_option = click.option(
     help="Also use the rule files in this directory. Repeatable.",
 )
 
+dialect_option = click.option(
+    "--dialect",
+    metavar="NAME|FILE.xml",
+    default="ardupilotmega",
+    show_default=True,
+    help="MAVLink dialect of the recording.",
+)
+input_kind_option = click.option(
+    "--input-kind",
+    type=click.Choice(["tlog", "raw", "pcap", "pcapng"]),
+    help="Read files as this, whatever their content looks like.",
+)
+
 
 def load_rules(directories: Sequence[Path]) -> Pack:
     """Return the shipped rules and those in `directories`; a bad rule file is a usage error."""

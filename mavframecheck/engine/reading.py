@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from mavframecheck.sources import Recording
 from mavframecheck.vehicle import Context, Traffic
 from mavframecheck.vehicle.roles import version_text
 from mavframecheck.vehicle.traffic import MAX_SENDERS, MAX_STREAMS
-from mavframecheck.wire import Batch, Dialect, read_batches
+from mavframecheck.wire import Batch, Dialect, Ranges, read_batches
 
 MAX_DAMAGE = 100
 """Damaged ranges that a report lists; all are counted."""
@@ -34,7 +34,7 @@ class Reading:
         self.counts = {"messages": 0, "unknown": 0, "bad_crc": 0, "skipped_bytes": 0}
         self._recording = recording
         self._dialect = dialect
-        self._open: Damage | None = None
+        self._ranges = Ranges()
 
     def batches(self, progress: Progress | None = None) -> Iterator[Batch]:
         """Yield the batches of the recording; `progress` is told how many bytes were read so far."""
@@ -47,30 +47,22 @@ class Reading:
             yield batch
             if progress is not None and len(batch):
                 progress(int(batch.frames.offset[-1]))
-        self._close_damage()
+        self._list(self._ranges.close())
 
     def _count(self, batch: Batch) -> None:
-        """Count the frames of a batch, and join damaged ranges that touch."""
+        """Count the frames and the damage of a batch."""
         frames = batch.frames
         self.counts["messages"] += int(np.count_nonzero(frames.good))
         self.counts["unknown"] += int(np.count_nonzero(~frames.known))
         self.counts["bad_crc"] += int(np.count_nonzero(frames.known & ~frames.crc_ok))
-        for damage in batch.damage:
-            self.counts["skipped_bytes"] += damage.length
-            last = self._open
-            if last is not None and last.offset + last.length == damage.offset:
-                length = last.length + damage.length
-                self._open = Damage(last.offset, length, last.reason)
-            else:
-                self._close_damage()
-                self._open = damage
+        self.counts["skipped_bytes"] += sum(damage.length for damage in batch.damage)
+        self._list(self._ranges.add(batch.damage))
 
-    def _close_damage(self) -> None:
-        if self._open is not None:
+    def _list(self, ranges: Iterable[Damage]) -> None:
+        for damage in ranges:
             self.damage_total += 1
             if len(self.damage) < MAX_DAMAGE:
-                self.damage.append(self._open)
-        self._open = None
+                self.damage.append(damage)
 
     def summary(self) -> dict[str, Any]:
         """Return what every report says of a file, by the names of its struct's fields."""

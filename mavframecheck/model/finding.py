@@ -143,8 +143,8 @@ class Vehicle(msgspec.Struct, frozen=True, kw_only=True):
     """Good frames it sent."""
 
 
-class FileReport(msgspec.Struct, frozen=True, kw_only=True):
-    """What was read of one file, and how each rule ended on it."""
+class FileSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """What was read of one file."""
 
     path: str
     """Path as given to `check`, or as found below a directory given."""
@@ -162,14 +162,19 @@ class FileReport(msgspec.Struct, frozen=True, kw_only=True):
     """First to last plausible receive time, s; None where the recording has no stamps."""
     time_start: float | None
     """First plausible receive time, s since 1970; None where the recording has no stamps."""
+    notes: tuple[str, ...]
+    """What else a reader of the report should know."""
+
+
+class FileReport(FileSummary, frozen=True, kw_only=True):
+    """What was read of one file, and how each rule ended on it."""
+
     vehicles: tuple[Vehicle, ...]
     """Components that spoke, ground stations included."""
     damage: tuple[Damage, ...]
     """The first ranges without a good frame."""
     damage_total: int
     """Damaged ranges in all; `damage` lists the first ones."""
-    notes: tuple[str, ...]
-    """What else a reader of the report should know."""
     runs: tuple[RuleRun, ...]
     """How each rule ended; a rule may end differently on each stream."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from mavframecheck.model.finding import Vehicle
+from mavframecheck.model.finding import FileSummary, Vehicle
 from mavframecheck.semantics.references import HeightReference, Reference
 
 
@@ -121,21 +121,9 @@ class SenderSurvey(Vehicle, frozen=True, kw_only=True):
     """By name."""
 
 
-class FileSurvey(msgspec.Struct, frozen=True, kw_only=True):
+class FileSurvey(FileSummary, frozen=True, kw_only=True):
     """The semantic map of one recording."""
 
-    path: str
-    kind: str
-    messages: int
-    """Good frames of known messages."""
-    unknown: int
-    """Frames whose id the dialect lacks."""
-    bad_crc: int
-    skipped_bytes: int
-    duration_s: float | None
-    time_start: float | None
-    """First plausible receive time, s since 1970."""
-    notes: tuple[str, ...]
     senders: tuple[SenderSurvey, ...]
     references: tuple[Reference, ...]
     """What the names in `FieldSurvey.frames` mean."""

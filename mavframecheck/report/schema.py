@@ -65,9 +65,15 @@ def _describe(defs: dict[str, Any]) -> None:
         properties = part.get("properties", {})
         for key, value in properties.items():
             value.pop("default", None)
-            value["description"] = docs[name, key]
+            value["description"] = docs[_owner(name, key), key]
         if properties:
             part["required"] = list(properties)
+
+
+def _owner(name: str, key: str) -> str:
+    """Return the struct that defines a field: `name`, or the one that it inherits the field from."""
+    bases = reversed(getattr(finding, name).__mro__)
+    return next(base.__name__ for base in bases if key in getattr(base, "__struct_fields__", ()))
 
 
 def _field_docs() -> dict[tuple[str, str], str]:

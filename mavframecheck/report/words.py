@@ -6,15 +6,8 @@ from datetime import UTC, datetime
 
 from mavframecheck.model import Vehicle
 from mavframecheck.report.escape import sentence
+from mavframecheck.semantics.names import FAMILY_NAMES
 
-_FAMILIES = {
-    "px4": "PX4",
-    "ardupilot": "ArduPilot",
-    "arducopter": "ArduCopter",
-    "arduplane": "ArduPlane",
-    "ardurover": "ArduRover",
-    "ardusub": "ArduSub",
-}
 _YEAR_10000 = 253_402_300_800
 _ROLES = {"gcs": "ground station", "adsb": "ADS-B receiver", "unknown": "unknown component"}
 
@@ -85,7 +78,7 @@ def autopilot(vehicle: Vehicle) -> str:
     """Return ``ArduCopter 4.7.0``, as far as the vehicle said so."""
     if vehicle.autopilot is None:
         return "unknown autopilot"
-    family = _FAMILIES.get(vehicle.autopilot, sentence(vehicle.autopilot))
+    family = FAMILY_NAMES.get(vehicle.autopilot, sentence(vehicle.autopilot))
     return (
         f"{family} {sentence(vehicle.version)}"
         if vehicle.version

@@ -2,6 +2,7 @@
 
 from mavframecheck.wire.batch import Batch, read_batches
 from mavframecheck.wire.chunk import Chunk, whole
+from mavframecheck.wire.damage import Ranges
 from mavframecheck.wire.dialect import (
     DEFAULT_DIALECT,
     Dialect,
@@ -23,6 +24,7 @@ __all__ = [
     "Field",
     "Frames",
     "Layout",
+    "Ranges",
     "Table",
     "Tables",
     "load_dialect",
