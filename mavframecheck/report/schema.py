@@ -65,15 +65,10 @@ def _describe(defs: dict[str, Any]) -> None:
         properties = part.get("properties", {})
         for key, value in properties.items():
             value.pop("default", None)
-            value["description"] = docs[_owner(name, key), key]
+            owners = [base.__name__ for base in getattr(finding, name).__mro__]
+            value["description"] = next(docs[o, key] for o in owners if (o, key) in docs)
         if properties:
             part["required"] = list(properties)
-
-
-def _owner(name: str, key: str) -> str:
-    """Return the struct that defines a field: `name`, or the one that it inherits the field from."""
-    bases = reversed(getattr(finding, name).__mro__)
-    return next(base.__name__ for base in bases if key in getattr(base, "__struct_fields__", ()))
 
 
 def _field_docs() -> dict[tuple[str, str], str]:
