@@ -78,7 +78,7 @@ def main() -> None:
     read = [read_rule(file) for file in arguments.rules]
     wrong = sum(try_examples(rule, source) for rule, source in read)
     print(f"{len(read)} rules, {wrong} examples wrong")
-    labels = {}
+    labels: dict[str, dict[str, list[str]]] = {}
     for folder in arguments.on if arguments.labels else []:
         labels |= tomllib.loads((Path(folder) / "labels.toml").read_text("utf-8"))
     pack = Pack(tuple(rule for rule, _ in read), {rule.code: source for rule, source in read})

@@ -68,6 +68,8 @@ class CompiledRule:
     def lets(self) -> dict[str, Expression]:
         """Named expressions, in order: each may use those before it."""
         names = frozenset(self.params) | OWN_NAMES
+        if self.rule.detect.check:
+            names |= {ANY_NAME}
         lets: dict[str, Expression] = {}
         for name, code in self.rule.let.items():
             lets[name] = self._expression(code, names, f"let.{name}")

@@ -53,7 +53,7 @@ catalogue entry, by the selector in the same row, else by what the autopilot tak
 Of a mask: groups_used: how many groups of fields it lets count (position, velocity, rates...); used_zero:
 whether all that it lets count is exactly zero; ignored_given: whether it ignores groups as a whole and each of
 them holds something.
-Instead of a field, does, does_surely, answer_to, note_on and takes take ``message`` where a message has no frame.
+In a message that has no such field (COMMAND_LONG has no frame), these say what becomes of it as it is.
 """
 
 

@@ -30,10 +30,11 @@ def used_zero(rows: Rows, mask: FieldTag) -> Bools:
 
 
 def ignored_given(rows: Rows, mask: FieldTag) -> Bools:
-    """Return (n,) whether a whole group is ignored, and every such group holds something."""
+    """Return (n,) whether a whole group is ignored, and every such group that was sent holds something."""
     every, some = np.ones(len(rows), np.bool_), np.zeros(len(rows), np.bool_)
     for group in _groups(mask):
-        ignored = ~_any_used(rows, group)
+        sent = np.any([rows.present(tag.field) for tag in group], axis=0)
+        ignored = sent & ~_any_used(rows, group)
         given = np.any([_holds_something(rows, tag) for tag in group], axis=0)
         every &= ~ignored | given
         some |= ignored

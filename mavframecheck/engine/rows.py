@@ -186,13 +186,12 @@ def join(parts: Sequence[Rows]) -> Rows:
     """Return the rows of `parts`, one after the other, with the context that each has found."""
     first = parts[0]
     joined = Rows(join_tables([part.table for part in parts]), first.source)
-    names = set.intersection(*(set(part.known) for part in parts))
-    for name in names:
-        columns = [part.known[name] for part in parts]
+    for name in {name for part in parts for name in part.known}:
+        columns = [part.context(name) for part in parts]
         joined.known[name] = Known(
             np.concatenate([c.values for c in columns]),
             np.concatenate([c.known for c in columns]),
-            columns[0].labels,
+            max((c.labels for c in columns), key=len),  # lists of texts only grow
         )
     return joined
 

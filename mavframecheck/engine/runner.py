@@ -292,7 +292,7 @@ def _episode(rule: CompiledRule, observation: Observation) -> Episode:
         name: plain(value) if value is not None else None
         for name, value in observation.values.items()
     }
-    words = _words(rule, ValueScope(observation.values, rule.params))
+    words = _words(rule, ValueScope(observation.values, rule.params, rule.lets))
     evidence: Evidence = {**values, **words.evidence}
     return Episode(
         rule=rule,

@@ -9,6 +9,7 @@ import numpy as np
 
 from mavframecheck.engine import governed, stacks
 from mavframecheck.engine.compiled import Binding, RuleFileError
+from mavframecheck.engine.expression import Expression
 from mavframecheck.engine.rows import Rows
 from mavframecheck.semantics.acceptance import Verdict
 from mavframecheck.semantics.tags import FieldTag
@@ -27,12 +28,12 @@ class RuleScope:
         """Return ``function(name)`` as a column; RuleFileError when the message has no such field."""
         if function == "takes":
             return stacks.taken(self.rows, self.binding.message)
-        if function in _OF_STACK and name == "message":
-            return stacks.verdicts(self.rows, self.binding.message, "", _OF_STACK[function])
         field, tag = self.binding.resolve(name)
         if field not in self.rows.table.layout.by_name:
             if function == "optional":
                 return np.full(len(self.rows), np.nan)
+            if function in _OF_STACK:
+                return stacks.verdicts(self.rows, self.binding.message, "", _OF_STACK[function])
             self._refuse(f"{self.binding.message} has no field called {name!r}")
         plain = _OF_FIELD.get(function)
         if plain is not None:
@@ -84,16 +85,24 @@ class RuleScope:
 class ValueScope:
     """What the texts of a rule with a Python check are filled in from: named values."""
 
-    def __init__(self, values: Mapping[str, Any], params: Mapping[str, Any]) -> None:
-        """Know `values` and the parameters of the rule."""
+    def __init__(
+        self,
+        values: Mapping[str, Any],
+        params: Mapping[str, Any],
+        lets: Mapping[str, Expression] | None = None,
+    ) -> None:
+        """Know `values`, the parameters of the rule and its named expressions."""
         self._values = {**params, **values}
+        self._lets = lets or {}
 
     def field(self, function: str, name: str) -> Any:
         """Fields are unknown here."""
         raise RuleFileError(f"{function}({name}) cannot be used in the texts of a Python check")
 
     def name(self, name: str) -> Any:
-        """Return the value called `name`."""
+        """Return the value, or the named expression, called `name`."""
+        if name in self._lets:
+            return self._lets[name](self)
         if name not in self._values:
             message = f"the check gives no value called {name!r}: it gives {', '.join(sorted(self._values))}"
             raise RuleFileError(message)

@@ -11,6 +11,16 @@ from mavframecheck.semantics.constants import constant, entry_name
 Family = Literal["px4", "arducopter", "arduplane", "ardurover", "ardusub", "ardupilot", "other"]
 """Autopilot families that behave alike; `ardupilot` is ArduPilot on any other type of vehicle."""
 
+FAMILY_NAMES = {
+    "px4": "PX4",
+    "ardupilot": "ArduPilot",
+    "arducopter": "ArduCopter",
+    "arduplane": "ArduPlane",
+    "ardurover": "ArduRover",
+    "ardusub": "ArduSub",
+}
+"""How people call the families."""
+
 _ARDUPILOT_TYPES: dict[Family, tuple[str, ...]] = {
     "arducopter": (
         *("QUADROTOR", "COAXIAL", "HELICOPTER", "HEXAROTOR", "OCTOROTOR"),
