@@ -146,7 +146,8 @@ class CompiledRule:
     @functools.cached_property
     def judged_by(self) -> frozenset[str]:
         """All context that decides whether a row is judged, and how."""
-        return (self.required | self._contexts(self.when)) - ALWAYS_KNOWN
+        tested = set().union(*(part.tested for part in self._with_lets(self.when)))
+        return (self.required | self._contexts(self.when) | tested) - ALWAYS_KNOWN
 
     @functools.cached_property
     def awaited(self) -> frozenset[str]:
@@ -155,7 +156,7 @@ class CompiledRule:
         for template in (self.text, self.fix, *self.evidence.values()):
             spoken += template.expressions
         parts = [p for e in (self.when, self.flag, self.worst, *spoken) for p in self._with_lets(e)]
-        named = self.required.union(*(part.contexts | part.hoped for part in parts))
+        named = self.required.union(*(part.contexts | part.hoped | part.tested for part in parts))
         return frozenset(name for name in named - ALWAYS_KNOWN if NAMES[name].waits)
 
     def _contexts(self, expression: Expression | None) -> set[str]:

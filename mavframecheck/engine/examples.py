@@ -38,14 +38,16 @@ class _Writer:
         self._seq: dict[tuple[int, int], int] = {}
         self.data = bytearray()
 
-    def send(self, step: Step, t: float) -> None:
+    def send(self, step: Step, t: float, repetition: int = 0) -> None:
         """Append the message of `step` at `t` seconds."""
         layout = self._dialect.by_name[step.message]
         fields = {name: number(value) for name, value in step.fields.items()}
-        if step.sender != "autopilot":
+        for name, more in step.each.items():
+            fields[name] = grown(fields.get(name, 0), more * repetition)
+        sender = sender_of(step.sender)
+        if sender[1] != SENDERS["autopilot"][1]:
             fields = {"target_system": 1, "target_component": 1} | fields
         fields = {n: v for n, v in fields.items() if n in layout.by_name or n in step.fields}
-        sender = SENDERS[step.sender]
         seq = self._seq[sender] = self._seq.get(sender, -1) + 1
         frame = encode_frame(
             layout,
@@ -61,6 +63,14 @@ class _Writer:
         self.data += stamped(frame, START_US + round(t * 1e6)) * copies
 
 
+def sender_of(name: str) -> tuple[int, int]:
+    """Return system and component of a sender: a role, or ``2/1`` for any other."""
+    if name in SENDERS:
+        return SENDERS[name]
+    system, _, component = name.partition("/")
+    return int(system), int(component)
+
+
 def number(value: Any) -> Any:
     """Return a field value of an example; ``ENUM.NAME`` stands for its number."""
     if (
@@ -72,14 +82,23 @@ def number(value: Any) -> Any:
     return value
 
 
+def grown(value: Any, more: float) -> Any:
+    """Return a field with something added; whole numbers stay whole."""
+    return value + (round(more) if isinstance(value, int) else more)
+
+
 def recording(example: Example, dialect: Dialect) -> bytes:
     """Return `example` as a tlog: its context, then its steps."""
     writer = _Writer(dialect)
     for step in _context_steps(example.context):
         writer.send(step, 0.0)
-    for step in example.step:
-        for k in range(step.repeat):
-            writer.send(step, CONTEXT_S + step.t + k * step.every)
+    sent = [
+        (CONTEXT_S + step.t + k * step.every, k, step)
+        for step in example.step
+        for k in range(step.repeat)
+    ]
+    for t, repetition, step in sorted(sent, key=lambda it: it[0]) if example.interleave else sent:
+        writer.send(step, t, repetition)
     return bytes(writer.data) + bytes.fromhex(example.raw)
 
 

@@ -229,6 +229,8 @@ class Expression:
             return self._field_call(name, node)
         if name == "known":
             return self._known(node)
+        if name == "maybe":
+            return self._maybe(node)
         if name == "stack":
             return self._stack(node)
         if name == "listed":
@@ -274,22 +276,31 @@ class Expression:
         value = self._compile(node.args[1])
         return lambda scope: scope.listed(key, value(scope))
 
+    def _maybe(self, node: ast.Call) -> Evaluate:
+        """Compile ``maybe(vehicle.alt_msl)``: the context where it is known, without requiring it."""
+        name = self._context_of(node, "maybe")
+        self.hoped.add(name)
+        return lambda scope: scope.context(name)
+
     def _known(self, node: ast.Call) -> Evaluate:
         """Compile ``known(home.lat)``: whether this context has come, or came in time."""
-        if len(node.args) != 1 or not isinstance(node.args[0], ast.Attribute):
-            raise _error(node, "known() takes one context name, as in known(home.lat)")
-        value = self._attribute(node.args[0])
-        self.tested.add(ast.unparse(node.args[0]))
+        name = self._context_of(node, "known")
+        self.tested.add(name)
 
         def evaluate(scope: Scope) -> Any:
-            found = value(scope)
+            found = np.asarray(scope.context(name))
             return (
-                found != "unknown"
-                if np.asarray(found).dtype.kind == "U"
-                else np.logical_not(np.isnan(found))
+                found != "unknown" if found.dtype.kind == "U" else np.logical_not(np.isnan(found))
             )
 
         return evaluate
+
+    def _context_of(self, node: ast.Call, function: str) -> str:
+        """Return the context name that a call is about."""
+        name = ast.unparse(node.args[0]) if len(node.args) == 1 else ""
+        if name not in NAMES:
+            raise _error(node, f"{function}() takes one context name, as in {function}(home.lat)")
+        return name
 
 
 _COMPILERS: dict[type[ast.expr], Callable[[Expression, Any], Evaluate]] = {

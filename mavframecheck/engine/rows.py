@@ -81,6 +81,22 @@ class Rows:
         """(n,) the system each row is about, negative where unknown."""
         return self.cached(("about",), lambda: self.source.about(self.table))
 
+    @property
+    def stream(self) -> Ints:
+        """(n,) sender, target and instance as one number: rows of one number follow each other."""
+        return self.cached(("stream",), self._stream)
+
+    def _stream(self) -> Ints:
+        table = self.table
+        stream = table.frames.sender
+        if "target_system" in table.layout.by_name:
+            stream = stream * 256 + self.raw("target_system")
+        fields = (tag.instance_field for tag in catalogue.tags(table.name))
+        instance = next(filter(None, fields), "")
+        if instance in table.layout.by_name and table[instance].dtype.kind in "iu":
+            stream = stream * 2**16 + (self.raw(instance) & 0xFFFF)
+        return np.asarray(stream, np.int64)
+
     def raw(self, field: str) -> Any:
         """Return a column as on the wire, widened so that arithmetic on it cannot wrap."""
         return self.cached(("raw", field), lambda: widened(self.table[field]))

@@ -15,7 +15,6 @@ from mavframecheck.engine.scope import RuleScope, ValueScope
 from mavframecheck.engine.template import Template, first_value, plain
 from mavframecheck.engine.waiting import Queue
 from mavframecheck.model import Evidence, Finding, RuleRun, Scalar, Severity, Subject
-from mavframecheck.semantics import catalogue
 from mavframecheck.vehicle import NAMES, Context
 from mavframecheck.wire import Batch, Dialect
 
@@ -109,7 +108,7 @@ class Runner:
     def finish(self) -> tuple[list[Finding], list[RuleRun]]:
         """Return all findings, and how each rule ended."""
         for desk in (desk for halls in self._halls.values() for h in halls for desk in h.desks):
-            self._judge_late(desk, desk.queue.close())
+            self._judge_ready(desk, desk.queue.close())
         runs = [self._run_of(rule) for rule in self._rules]
         for rule, check in self._checks:
             runs.append(_verdict_of(rule, check))
@@ -131,12 +130,8 @@ class Runner:
 
     def _serve(self, desk: _Desk, rows: Rows | None, batch: Batch) -> None:
         if desk.queue.names:
-            released = desk.queue.offer(rows, batch.frames)
-            self._judge_late(desk, released.late)
-            rows = released.ready
-        if rows is not None and len(rows):
-            for rule, label, bindings in desk.rules:
-                self._judge(rule, label, bindings, rows)
+            rows = desk.queue.offer(rows, batch.frames)
+        self._judge_ready(desk, rows)
 
     def _judge(
         self, rule: CompiledRule, label: str | None, bindings: list[Binding], rows: Rows
@@ -193,7 +188,7 @@ class Runner:
             return Subject(int(frames.sysid[row]), int(frames.compid[row]), rows.table.name, shown)
 
         judged = Judged(
-            _streams(rows)[places],
+            rows.stream[places],
             frames.take(places),
             hit[places],
             badness[places],
@@ -202,16 +197,21 @@ class Runner:
         )
         self._episodes.collect(rule, rows.table.name, label, judged)
 
-    def _judge_late(self, desk: _Desk, rows: Rows | None) -> None:
-        """Judge rows whose context never came where a rule can do without it; count the others."""
+    def _judge_ready(self, desk: _Desk, rows: Rows | None) -> None:
+        """Judge rows; where context never came, those that a rule can judge without. Count the others."""
         if rows is None or not len(rows):
             return
+        complete = rows.complete(desk.queue.names)
+        if complete.all():
+            for rule, label, bindings in desk.rules:
+                self._judge(rule, label, bindings, rows)
+            return
         for rule, label, bindings in desk.rules:
-            decidable = rows.complete(rule.required)
+            decidable = complete | rows.complete(rule.required)
             looked = np.zeros(len(rows), np.bool_)
             if decidable.any():
                 looked[decidable] = self._judge(rule, label, bindings, rows.take(decidable))
-            stuck = ~looked & ~rows.complete(rule.judged_by)
+            stuck = ~complete & ~looked & ~rows.complete(rule.judged_by)
             if stuck.any():
                 concerned = stuck & np.any([_concerns(b, rows) for b in bindings], axis=0)
                 tally = self._tallies[rule.rule.code]
@@ -251,18 +251,6 @@ def _among(rows: Rows, name: str, choice: Choice) -> Bools:
     """Return (n,) rows whose context word is among those of `choice`."""
     column = rows.context(name)
     return column.among(choice.allows)
-
-
-def _streams(rows: Rows) -> np.typing.NDArray[np.int64]:
-    """Return (n,) sender, target and instance as one number: rows of one number follow each other."""
-    table = rows.table
-    stream = table.frames.sender
-    if "target_system" in table.layout.by_name:
-        stream = stream * 256 + rows.raw("target_system")
-    instance = next((t.instance_field for t in catalogue.tags(table.name) if t.instance_field), "")
-    if instance in table.layout.by_name and table[instance].dtype.kind in "iu":
-        stream = stream * 2**16 + (rows.raw(instance) & 0xFFFF)
-    return np.asarray(stream, np.int64)
 
 
 def _words(rule: CompiledRule, scope: RuleScope | ValueScope) -> Words:

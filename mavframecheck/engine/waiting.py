@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from mavframecheck.engine.rows import Rows, join
+from mavframecheck.engine.rows import Bools, Ints, Rows, join
 from mavframecheck.vehicle import NAMES
 from mavframecheck.vehicle.history import LATE_FRAMES, LATE_US
 from mavframecheck.wire import Frames
-
-
-class Released(NamedTuple):
-    """Rows that leave the queue: `ready` to be judged, or `late` for context that did not come."""
-
-    ready: Rows | None
-    late: Rows | None
 
 
 class Queue:
@@ -28,25 +19,24 @@ class Queue:
         self._patience_us = max((_patience_us(name) for name in names), default=0)
         self._waiting: Rows | None = None
 
-    def offer(self, rows: Rows | None, now: Frames) -> Released:
-        """Add `rows`; return all that have their context, and those that waited too long.
+    def offer(self, rows: Rows | None, now: Frames) -> Rows | None:
+        """Add `rows`; return those that have their context, and those that waited too long.
 
-        `now` are the frames of the current batch: their end is the present.
+        Rows of one stream leave in the order in which they came. `now` are the frames of the current
+        batch: their end is the present.
         """
         parts = [part for part in (self._waiting, rows) if part is not None and len(part)]
         self._waiting = None
         if not parts:
-            return Released(None, None)
+            return None
         both = parts[0] if len(parts) == 1 else join(parts)
         both.refresh(self.names)
-        complete = both.complete(self.names)
-        if complete.all():
-            return Released(both, None)
-        late = ~complete & _too_old(both, now, self._patience_us)
-        keep = ~complete & ~late
-        if keep.any():
-            self._waiting = both.take(keep).compact()
-        return Released(both.take(complete), both.take(late) if late.any() else None)
+        undecided = ~both.complete(self.names) & ~_too_old(both, now, self._patience_us)
+        if not undecided.any():
+            return both
+        held = _from_first(both.stream, undecided)
+        self._waiting = both.take(held).compact()
+        return both.take(~held)
 
     def close(self) -> Rows | None:
         """Return what still waits when the recording ends."""
@@ -60,10 +50,18 @@ def _patience_us(name: str) -> int:
     return (entry.max_age_us or 0) if entry.after else LATE_US
 
 
-def _too_old(rows: Rows, now: Frames, patience_us: int) -> np.typing.NDArray[np.bool_]:
+def _too_old(rows: Rows, now: Frames, patience_us: int) -> Bools:
     """Return (n,) rows for which a value said after `now` would come too late."""
     if not len(now):
         return np.zeros(len(rows), np.bool_)
     frames = rows.table.frames
     old = now.number[-1] - frames.number > LATE_FRAMES
     return np.asarray(old | (now.clock_us[-1] - frames.clock_us > patience_us))
+
+
+def _from_first(stream: Ints, rows: Bools) -> Bools:
+    """Return (n,) the given rows, and those that come after one of them in its stream."""
+    _, which = np.unique(stream, return_inverse=True)
+    first = np.full(len(stream), len(stream))
+    np.minimum.at(first, which[rows], np.flatnonzero(rows))
+    return np.asarray(np.arange(len(stream)) >= first[which])
