@@ -10,6 +10,7 @@ import click
 
 from mavframecheck.cli.options import dialect_option, input_kind_option
 from mavframecheck.cli.output import echo, page_context
+from mavframecheck.cli.positions import FORMATS, Positions, Wish, position_options
 from mavframecheck.report import Context
 from mavframecheck.report.escape import sentence
 
@@ -26,10 +27,9 @@ _PIPE_WIDTH = 100
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="text is for people; json is described in docs/output.md.",
+    type=click.Choice(["text", "json", *FORMATS]),
+    help="text (default) is for people; json is described in docs/output.md. "
+    "Positions: csv (default), jsonl, parquet.",
 )
 @click.option(
     "--message",
@@ -44,6 +44,7 @@ _PIPE_WIDTH = 100
     is_flag=True,
     help="Show every field, not only those about place, attitude, time and frames.",
 )
+@position_options
 @dialect_option
 @input_kind_option
 @click.pass_context
@@ -51,26 +52,34 @@ def inspect(
     ctx: click.Context,
     /,
     paths: tuple[str, ...],
-    form: str,
+    form: str | None,
     messages: tuple[str, ...],
     every_field: bool,
     dialect: str,
     input_kind: str | None,
+    wish: Wish | None,
 ) -> None:
     """Show who sends what in a recording, and what each number means.
 
     LOG is a file, a directory, or - for standard input. Per sender and message: rate, and for each
     field its unit, frame, direction, height reference, clock, range and how much of it is missing.
+    With --positions: every position as a record instead.
 
     Exit codes: 0 done, 2 wrong usage or a file that cannot be read, 3 nothing could be decoded.
     """
     from mavframecheck.engine import Settings
 
-    view = VIEWS["map"](Settings(dialect=dialect, input_kind=input_kind), messages)
+    settings = Settings(dialect=dialect, input_kind=input_kind)
+    if wish is not None:
+        exporter = Positions(settings, _known(messages, dialect), wish)
+        ctx.exit(exporter.show(paths, form or "csv"))
+    if form in FORMATS:
+        raise click.UsageError(f"--format {form} goes with --positions")
+    view = VIEWS["map"](settings, messages)
     context = page_context()
     if not context.terminal:
         context = context._replace(width=_PIPE_WIDTH)
-    ctx.exit(view.show(paths, form, context, every_field=every_field))
+    ctx.exit(view.show(paths, form or "text", context, every_field=every_field))
 
 
 class _Map:

@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.engine.rows import Rows
 from mavframecheck.semantics.tags import FieldTag, Sentinel
+from mavframecheck.vehicle.rows import Rows
 from mavframecheck.wire import Field, Frames
 
 Bools = npt.NDArray[np.bool_]

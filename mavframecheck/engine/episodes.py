@@ -115,9 +115,11 @@ class Episodes:
         fresh = [s for s in dict.fromkeys(judged.stream[hits].tolist()) if s not in streams]
         for stream in fresh[: MAX_STREAMS - len(streams)]:
             streams[stream] = _Stream()
-        for stream, episodes in streams.items():
-            places = np.flatnonzero(judged.stream == stream)
-            if len(places):
+        order = np.argsort(judged.stream, kind="stable")
+        edges = np.flatnonzero(np.diff(judged.stream[order])) + 1
+        for places in np.split(order, edges):
+            episodes = streams.get(int(judged.stream[places[0]]))
+            if episodes is not None:
                 _extend(episodes, rule, judged, places)
 
     def observe(self, episode: Episode) -> None:
@@ -142,7 +144,8 @@ def _extend(stream: _Stream, rule: CompiledRule, judged: Judged, places: Ints) -
         full = len(stream.episodes) >= MAX_EPISODES
         run = ranks[np.searchsorted(ranks, near[0]) :] if full else near
         right_before = int(run[0]) - done + (stream.episodes[-1].since if stream.episodes else 0)
-        _add_run(stream, rule, judged, places[run], right_before)
+        length = int(run[-1] - run[0]) + 1
+        _add_run(stream, rule, judged, places[run], right_before, length)
         done = int(run[-1]) + 1
         if done > ranks[-1]:
             break
@@ -160,13 +163,17 @@ def _runs(judged: Judged, places: Ints, ranks: Ints) -> list[Ints]:
 
 
 def _add_run(
-    stream: _Stream, rule: CompiledRule, judged: Judged, hits: Ints, right_before: int
+    stream: _Stream,
+    rule: CompiledRule,
+    judged: Judged,
+    hits: Ints,
+    right_before: int,
+    length: int,
 ) -> None:
-    """Add a run of hits, `right_before` of whose predecessors were right, to the episodes of a stream."""
+    """Add a run of hits, within `length` rows and after `right_before` right ones, to a stream's episodes."""
     first, last = _mark(judged.frames, int(hits[0])), _mark(judged.frames, int(hits[-1]))
     worst = int(hits[np.argmax(judged.badness[hits])])
     badness = float(judged.badness[worst])
-    length = int(np.count_nonzero(judged.stream[hits[0] : hits[-1] + 1] == judged.stream[hits[0]]))
     current = stream.episodes[-1] if stream.episodes else None
     full = len(stream.episodes) >= MAX_EPISODES
     if current is not None and (full or _continues(current, first, right_before)):

@@ -37,7 +37,7 @@ FIELD_FUNCTIONS = frozenset(
         "ignored_given",
     }
 )
-"""Functions of a field, by name; `engine.rows` answers them.
+"""Functions of a field, by name; `vehicle.rows` answers them.
 
 raw: as on the wire (optional: NaN in a message that has no such field); si: in SI by the catalogue (latitude and longitude in degrees); used, ignored: by the
 field's own ignore bit; unknown: a sentinel that says "not known" (any_unknown: in any element; any_nan:

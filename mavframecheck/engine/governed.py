@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from mavframecheck.engine.rows import Bools, Rows
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.tags import FieldTag
+from mavframecheck.vehicle.rows import Bools, Rows
 
 
 def groups_used(rows: Rows, mask: FieldTag) -> Any:

@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.engine.reading import Progress, Reading
-from mavframecheck.engine.rows import Rows
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.enums import AltRef, Clock, CovLayout, Frame, Quantity, RefPoint
@@ -33,6 +32,7 @@ from mavframecheck.semantics.positions import (
 from mavframecheck.semantics.references import selected_height
 from mavframecheck.semantics.tags import Condition, FieldTag
 from mavframecheck.vehicle.context import Context
+from mavframecheck.vehicle.rows import Rows
 from mavframecheck.wire import Batch, Layout
 
 Floats = npt.NDArray[np.float64]

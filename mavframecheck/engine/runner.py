@@ -10,12 +10,12 @@ import numpy as np
 from mavframecheck.checks import Check, Observation, load_check
 from mavframecheck.engine.compiled import Binding, Choice, CompiledRule, bind
 from mavframecheck.engine.episodes import Bools, Episode, Episodes, Judged, Mark, Words
-from mavframecheck.engine.rows import Rows
 from mavframecheck.engine.scope import RuleScope, ValueScope
 from mavframecheck.engine.template import Template, first_value, plain
 from mavframecheck.engine.waiting import Queue
 from mavframecheck.model import Evidence, Finding, RuleRun, Scalar, Severity, Subject
 from mavframecheck.vehicle import NAMES, Context
+from mavframecheck.vehicle.rows import Rows
 from mavframecheck.wire import Batch, Dialect
 
 

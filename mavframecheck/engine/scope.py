@@ -10,9 +10,9 @@ import numpy as np
 from mavframecheck.engine import governed, stacks
 from mavframecheck.engine.compiled import Binding, RuleFileError
 from mavframecheck.engine.expression import Expression
-from mavframecheck.engine.rows import Rows
 from mavframecheck.semantics.acceptance import Verdict
 from mavframecheck.semantics.tags import FieldTag
+from mavframecheck.vehicle.rows import Rows
 
 
 class RuleScope:

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.engine.rows import Rows
 from mavframecheck.semantics import acceptance
 from mavframecheck.semantics.constants import entry_name
 from mavframecheck.semantics.enums import AltRef
 from mavframecheck.semantics.tags import FieldTag
+from mavframecheck.vehicle.rows import Rows
 
 FAMILY, VERSION = "vehicle.autopilot", "vehicle.version"
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from mavframecheck.engine.columns import FieldColumn, Intervals, Tally
 from mavframecheck.engine.fields import field_survey, value_said, values_seen
-from mavframecheck.engine.rows import Rows
 from mavframecheck.model.survey import StreamSurvey, ValueCount, ViewSurvey
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.enums import Quantity
 from mavframecheck.semantics.tags import Condition, FieldTag
+from mavframecheck.vehicle.rows import Rows
 from mavframecheck.wire import Field, Layout
 
 MOST_VIEWS = 32

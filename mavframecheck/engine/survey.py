@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterable, Iterator
 import numpy as np
 
 from mavframecheck.engine.reading import Progress, Reading
-from mavframecheck.engine.rows import Rows
 from mavframecheck.engine.settings import Settings
 from mavframecheck.engine.streams import Stream
 from mavframecheck.model import Vehicle
@@ -21,6 +20,7 @@ from mavframecheck.model.survey import (
 from mavframecheck.semantics.references import height_reference, reference
 from mavframecheck.sources import open_recording
 from mavframecheck.vehicle import Context
+from mavframecheck.vehicle.rows import Rows
 from mavframecheck.wire import Batch, Layout, Table, load_dialect
 
 MOST_SPLIT = 64

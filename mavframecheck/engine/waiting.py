@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mavframecheck.engine.rows import Bools, Ints, Rows, join
 from mavframecheck.vehicle import NAMES
 from mavframecheck.vehicle.history import LATE_FRAMES, LATE_US
+from mavframecheck.vehicle.rows import Bools, Ints, Rows, join
 from mavframecheck.wire import Frames
 
 

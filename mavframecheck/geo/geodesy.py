@@ -1,4 +1,4 @@
-"""Distances, bearings and local axes on the WGS 84 ellipsoid.
+"""Distances, bearings, ECEF and local axes on the WGS 84 ellipsoid.
 
 Positions are degrees and, where there is a height, metres above the ellipsoid. Arguments may have any
 shapes that broadcast to one another. NaN comes out where a latitude is beyond 90 degrees or anything
@@ -10,11 +10,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.geo.rotations import ned_from_ecef, turn
+
 Floats = npt.NDArray[np.float64]
 
 SEMI_MAJOR_M = 6_378_137.0
 FLATTENING = 1 / 298.257223563
 """WGS 84, NIMA TR8350.2."""
+ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
+DEEPEST_M = 5_350_000.0
+"""Points nearer to the centre of the Earth than this have no geodetic position here."""
 
 
 def distance_m(
@@ -96,6 +101,47 @@ def geodetic_from_ned(
     with np.errstate(all="ignore"):
         geodetic = np.stack(pymap3d.ned2geodetic(*given), axis=-1)
     return _where(_sound(*given) & (np.abs(given[3]) <= 90), geodetic)
+
+
+def ecef_from_geodetic(lat: npt.ArrayLike, lon: npt.ArrayLike, h: npt.ArrayLike) -> Floats:
+    """Return (..., 3) m, ECEF: x to 0 N 0 E, y to 0 N 90 E, z to the north pole. Source: pymap3d.
+
+    `h` is above the ellipsoid: a height above the sea put in its place moves the point up or down.
+    """
+    import pymap3d
+
+    given = np.broadcast_arrays(*(np.asarray(a, float) for a in (lat, lon, h)))
+    sound = _sound(*given) & (np.abs(given[0]) <= 90)
+    place = [np.where(sound, column, 0.0) for column in given]
+    return _where(sound, np.stack(pymap3d.geodetic2ecef(*place), axis=-1))
+
+
+def geodetic_from_ecef(xyz: npt.ArrayLike) -> Floats:
+    """Return (..., 3) latitude and longitude, degrees, and ellipsoid height, m, of (..., 3) m ECEF.
+
+    Undoes `ecef_from_geodetic` to a micrometre within 1 000 km of the surface, to 0.1 mm up to 40 000 km.
+    Deeper the result is NaN: towards the centre a point lies above several places at once.
+    Source: pymap3d, whose latitude is then improved (at 1 000 km it is 2 cm off).
+    """
+    import pymap3d
+
+    points = np.asarray(xyz, float)
+    with np.errstate(all="ignore"):
+        sound = np.linalg.norm(points, axis=-1) > DEEPEST_M
+        sound &= _sound(*np.moveaxis(points, -1, 0))
+        place = np.where(sound[..., np.newaxis], points, [SEMI_MAJOR_M, 0.0, 0.0])
+        geodetic = np.stack(pymap3d.ecef2geodetic(*np.moveaxis(place, -1, 0)), axis=-1)
+    return _where(sound, _improved(geodetic, place))
+
+
+def _improved(geodetic: Floats, ecef: Floats) -> Floats:
+    """Return positions whose latitude and height are corrected by how far they miss `ecef`, (..., 3)."""
+    lat, lon, h = np.moveaxis(geodetic, -1, 0)
+    off = turn(ned_from_ecef(lat, lon), ecef - ecef_from_geodetic(lat, lon, h))
+    squash = 1 - ECCENTRICITY_SQUARED * np.sin(np.radians(lat)) ** 2
+    radius = SEMI_MAJOR_M * (1 - ECCENTRICITY_SQUARED) / squash**1.5
+    better = np.clip(lat + np.degrees(off[..., 0] / (radius + h)), -90, 90)
+    return np.stack([better, lon, h - off[..., 2]], axis=-1)
 
 
 def _reduced(lat: npt.ArrayLike) -> Floats:

@@ -100,6 +100,8 @@ class Step(_Part, frozen=True):
     sender: str = msgspec.field(default="companion", name="from")
     repeat: int = 1
     every: float = 0.1
+    each: dict[str, float] = {}
+    """What is added to a field with every repetition: a stamp that runs, a value that changes."""
     version: Literal[1, 2] = 2
     mangle: Literal["", "checksum", "lost", "twice"] = ""
     """What goes wrong on the way: the checksum breaks, the frame is lost, or it arrives twice."""
@@ -111,6 +113,8 @@ class Example(_Part, frozen=True):
     expect: Literal["bad", "good"]
     step: tuple[Step, ...] = ()
     context: dict[str, Any] = {}
+    interleave: bool = False
+    """The steps go on side by side: frames in order of time, not step by step."""
     raw: str = ""
     """Bytes in hexadecimal appended after the steps (for rules about the stream itself)."""
     note: str = ""

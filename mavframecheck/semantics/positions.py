@@ -144,6 +144,12 @@ class _Typed:
         """The frame in words."""
         raise NotImplementedError
 
+    def __radd__(self, other: object) -> NoReturn:
+        self._refuse("add", other, "numbers without a frame have no place")
+
+    def __rsub__(self, other: object) -> NoReturn:
+        self._refuse("subtract", other, "numbers without a frame have no place")
+
     def _refuse(self, verb: str, other: object, why: str) -> NoReturn:
         """Raise, naming both sides: "subtract B from A", "add B to A"."""
         word = "from" if verb == "subtract" else "to"
@@ -151,7 +157,7 @@ class _Typed:
 
 
 def _named(thing: object) -> str:
-    return thing.described if isinstance(thing, _Typed) else f"a {type(thing).__name__}"
+    return thing.described if isinstance(thing, _Typed) else f"plain {type(thing).__name__}"
 
 
 def _taken(thing: Any, rows: Ints | Bools) -> Any:
@@ -191,8 +197,9 @@ class _Vector(_Metric):
 
     unit: str
 
-    def __add__(self, other: object) -> Self:
-        return self._plus("add", other, 1.0)
+    def __add__(self, other: object) -> Any:
+        """Return the sum of two vectors; a position is moved."""
+        return other + self if isinstance(other, _Point) else self._plus("add", other, 1.0)
 
     def __sub__(self, other: object) -> Self:
         return self._plus("subtract", other, -1.0)
@@ -361,10 +368,11 @@ class GeodeticPosition(_Typed):
                 "UTM reaches from 80 S to 84 N: a position lies beyond, or none is known"
             )
         if len(zones) > 1 or len(halves) > 1:
+            several = "zones" if len(zones) > 1 else "zone"
+            where = "both hemispheres" if len(halves) > 1 else "one hemisphere"
             raise MixingError(
-                f"positions lie in UTM zones {', '.join(map(str, zones.tolist()))} of "
-                f"{'both hemispheres' if len(halves) > 1 else 'one hemisphere'}: one zone of one "
-                f"hemisphere is one map; choose it, or take geodetic or local positions"
+                f"positions lie in UTM {several} {', '.join(map(str, zones.tolist()))} of {where}: "
+                f"one zone of one hemisphere is one map; choose it, or take geodetic or local positions"
             )
         return int(zones[0]), bool(halves[0])
 

@@ -12,9 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mavframecheck.vehicle.facts import NAMES, SOURCES, WORDS, Name, Source, histories
+from mavframecheck.vehicle.clocks import ClockBook
+from mavframecheck.vehicle.facts import NAMES, REGISTERED, SOURCES, WORDS, Name, Source, histories
 from mavframecheck.vehicle.history import Answer, Asked, Bools, History, Ints, Values
-from mavframecheck.vehicle.roles import ROLES, RoleBook
+from mavframecheck.vehicle.origins import MESSAGES, Registry
+from mavframecheck.vehicle.roles import ROLES, Meant, RoleBook
+from mavframecheck.vehicle.timing import Clocks
 from mavframecheck.wire import Batch, Table
 
 MAX_WORDS = 2000
@@ -60,6 +63,11 @@ class Context:
         self._words: dict[str, dict[str, int]] = {name: {UNKNOWN: 0} for name in WORDS}
         self._batch: Batch | None = None
         self._fed: set[str] = set()
+        self._registry = Registry()
+        self._registered = False
+        self._clocks = ClockBook()
+        self._clocked = False
+        self._timing: Clocks | None = None
 
     def update(self, batch: Batch) -> None:
         """Take in what `batch` says. Call `settle` once every rule has read it."""
@@ -67,27 +75,70 @@ class Context:
         self._fed.clear()
         if "HEARTBEAT" in batch.tables:
             self._roles.update(batch.tables["HEARTBEAT"])
+        self._registered = False
+        self._clocked = False
+        self._timing = None
+
+    @property
+    def clocks(self) -> ClockBook:
+        """The stamps of every stream; who wants them asks in every batch, so that none is missed."""
+        if not self._clocked and self._batch is not None:
+            self._clocked = True
+            self._clocks.update(self._batch)
+        return self._clocks
+
+    @property
+    def timing(self) -> Clocks:
+        """What `clocks` show, once the whole recording is read."""
+        if self._timing is None:
+            self._timing = Clocks(self._clocks, self.role)
+        return self._timing
+
+    @property
+    def registry(self) -> Registry:
+        """Origins, homes and launch points, with all that the current batch says of them."""
+        if not self._registered and self._batch is not None:
+            self._registered = True
+            said = {name: self._batch.tables.get(name) for name in MESSAGES}
+            own = {name: self._by_autopilots(table) for name, table in said.items() if table}
+            self._registry.update(
+                self._batch, {name: table for name, table in own.items() if table}
+            )
+        return self._registry
+
+    def _by_autopilots(self, table: Table) -> Table:
+        speaks = self._roles.of(table) == ROLES.index("autopilot")
+        return table if speaks.all() else table.take(speaks)
 
     def settle(self) -> None:
         """Forget what only rows of the current batch could ask for."""
+        _ = self.registry
         for name, history in self._histories.items():
             if name not in self._fed:
                 self._feed(name, only_last=True)
             history.settle()
-        self._roles.settle()
+        if self._batch is not None and len(self._batch):
+            self._roles.settle(int(self._batch.frames.number[-1]))
         self._batch = None
 
-    def lookup(self, name: str, table: Table) -> Known:
-        """Return the context column `name` for the rows of `table`; KeyError for an unknown name."""
+    def lookup(self, name: str, table: Table, *, late: bool = True) -> Known:
+        """Return the context column `name` for the rows of `table`; KeyError for an unknown name.
+
+        Not `late`: only what was said before a row, so that one look suffices wherever batches end.
+        """
         entry = NAMES[name]
         if entry.key == "sender":
             return Known(self._roles.of(table), np.ones(len(table), np.bool_), ROLES)
         asked = self._asked(entry, table)
-        answers = [(self._ready(h), q, self._answer(entry, h, asked)) for h, q in entry.sources]
+        if not late:
+            asked = asked._replace(key=np.where(asked.since > asked.number, -1, asked.key))
+        answers = [
+            (self._ready(h), q, self._answer(entry, h, asked, late=late)) for h, q in entry.sources
+        ]
         values, known = np.full(len(table), np.nan), np.zeros(len(table), np.bool_)
         earliest = np.min([answer.number for _, _, answer in answers], axis=0)
         for history, quantity, answer in answers:
-            said_before = answer.found & (answer.number < asked.number)
+            said_before = answer.found & (answer.number < asked.since)
             take = ~known & answer.found & (said_before | (answer.number == earliest))
             values = np.where(take, history.values(quantity, answer), values)
             known |= take
@@ -106,20 +157,22 @@ class Context:
         return Known(places, known, tuple(words))
 
     def _asked(self, entry: Name, table: Table) -> Asked:
-        key = self.about(table)
+        key, since = self._meant(table)
         if entry.key == "command":
             commanded = "command" in table.layout.by_name
             command = table["command"].astype(np.int64) if commanded else np.full(len(key), -1)
             key = np.where((key >= 0) & (command >= 0), key << 16 | command, -1)
-        return Asked(key, table.frames.number, table.frames.t_us, table.frames.t_valid)
+        frames = table.frames
+        times = (frames.t_us, frames.t_valid, frames.clock_us)
+        return Asked(key, frames.number, since, *times)
 
-    def _answer(self, entry: Name, history: str, asked: Asked) -> Answer:
+    def _answer(self, entry: Name, history: str, asked: Asked, *, late: bool) -> Answer:
         """Find the value before each row, else the first one soon after it (an answer: only that)."""
         kept = self._ready(history)
         if entry.after:
             return kept.after(asked, entry.max_age_us or 0)
         before = kept.before(asked, entry.max_age_us)
-        alone = not entry.waits or (self._assumed is not None and history == "identity")
+        alone = not (late and entry.waits) or (self._assumed is not None and history == "identity")
         if alone or before.found.all():
             return before
         after = kept.after(asked)
@@ -134,6 +187,8 @@ class Context:
 
     def _feed(self, name: str, *, only_last: bool) -> None:
         """Add what the current batch says to a history: every row, or the last one of each system."""
+        if name in REGISTERED:
+            self._feed_registered(name)
         for source in _SOURCES_OF[name]:
             table = self._batch.tables.get(source.message) if self._batch is not None else None
             if table is not None:
@@ -142,6 +197,20 @@ class Context:
                 if len(kept):
                     values = {q: self._numbers(q, read(kept)) for q, read in source.reads.items()}
                     self._histories[name].extend(_keys(source, kept), kept.frames, values)
+
+    def _feed_registered(self, name: str) -> None:
+        """Add what the batch establishes of origins or launch points to a history."""
+        news = sorted(self.registry.news(name), key=lambda each: each[1].number)
+        if not news or self._batch is None:
+            return
+        frames = self._batch.frames
+        rows = np.array([seen.number for _, seen, _ in news]) - frames.number[0]
+        keys = np.array([system for system, _, _ in news], np.int64)
+        values = {
+            quantity: np.array([said.get(quantity, np.nan) for _, _, said in news])
+            for quantity in REGISTERED[name]
+        }
+        self._histories[name].extend(keys, frames.take(rows), values)
 
     def _rows(self, source: Source, table: Table) -> Ints:
         """Return the rows of a table in which an autopilot says something."""
@@ -179,15 +248,26 @@ class Context:
         It is the target; else, for what an autopilot sends, its own system; else the sender's system where
         that has an autopilot; else the only system with one.
         """
-        sysid = table.frames.sysid.astype(np.int64)
+        return self._meant(table).system
+
+    def about_then(self, table: Table) -> Ints:
+        """Return (n,) the same as it was known when each row was sent."""
+        meant = self._meant(table)
+        return np.where(meant.since > table.frames.number, -1, meant.system)
+
+    def _meant(self, table: Table) -> Meant:
+        sysid, number = table.frames.sysid.astype(np.int64), table.frames.number
         own = self._roles.of(table) == ROLES.index("autopilot")
         if own.all():
-            return sysid
-        about = np.where(own, sysid, self._roles.autopilot_for(sysid, table.frames.number))
+            return Meant(sysid, number)
+        told = own
+        about, since = self._roles.autopilot_for(table.frames)
+        about = np.where(own, sysid, about)
         if "target_system" in table.layout.by_name:
             target = table["target_system"].astype(np.int64)
+            told = own | (target > 0)
             about = np.where(~own & (target > 0), target, about)
-        return about
+        return Meant(about, np.where(told, number, since))
 
 
 def _keys(source: Source, table: Table) -> Ints:

@@ -16,6 +16,8 @@ from mavframecheck.vehicle.history import Bools, Values
 from mavframecheck.wire import Table
 
 SECOND_US = 1_000_000
+UNIX_US = 10**15
+"""What the standard says of stamps: from here on (2001) they count from 1970."""
 ARMED = 128
 """MAV_MODE_FLAG_SAFETY_ARMED."""
 
@@ -105,6 +107,10 @@ def _yaw_of_heading(table: Table) -> Values:
     return np.where(table["hdg"] == 65535, np.nan, np.arctan2(np.sin(yaw), np.cos(yaw)))
 
 
+def _boot_utc(table: Table) -> Values:
+    return table["time_unix_usec"] * 1e-6 - table["time_boot_ms"] * 1e-3
+
+
 def _param_name(table: Table) -> Values:
     return table["param_id"]
 
@@ -166,16 +172,6 @@ SOURCES: tuple[Source, ...] = (
         },
     ),
     Source(
-        "GPS_GLOBAL_ORIGIN",
-        "origin",
-        {
-            "lat": at("latitude", 1e-7),
-            "lon": at("longitude", 1e-7),
-            "alt_msl": at("altitude", 1e-3),
-        },
-        _placed("latitude", "longitude"),
-    ),
-    Source(
         "LOCAL_POSITION_NED",
         "local",
         {name: at(name) for name in ("x", "y", "z", "vx", "vy", "vz")},
@@ -207,13 +203,22 @@ SOURCES: tuple[Source, ...] = (
             "loaded": at("loaded"),
         },
     ),
+    Source("SYSTEM_TIME", "boot_utc", {"utc": _boot_utc}, lambda t: t["time_unix_usec"] >= UNIX_US),
     Source("COMMAND_ACK", "command_answers", {"result": at("result")}, key="command"),
     Source("MISSION_ACK", "mission_answers", {"result": at("type")}),
     Source("STATUSTEXT", "texts", {"text": lambda t: t["text"]}, lambda t: t["severity"] <= 4),
 )
 """What autopilots say; a source of HEARTBEAT comes before those that need to know who is one."""
 
+REGISTERED = {
+    "origin": ("id", "lat", "lon", "alt_msl"),
+    "launch": ("lat", "lon", "alt_msl"),
+}
+"""Histories that the registry of origins feeds, and their quantities."""
+
 _POSITION = "no GLOBAL_POSITION_INT with a position"
+_ORIGIN = "no GPS_GLOBAL_ORIGIN, and no local and global positions together"
+_LAUNCH = "the vehicle is not armed in the recording"
 _HEARTBEAT = "no HEARTBEAT of the autopilot says what it is"
 _FRESH = 30 * SECOND_US
 
@@ -274,6 +279,12 @@ NAMES: dict[str, Name] = {
     "vehicle.yaw": Name(
         (("attitude", "yaw"), ("heading", "yaw")), "rad, from true north", "no ATTITUDE", _FRESH
     ),
+    "vehicle.boot_utc": Name(
+        (("boot_utc", "utc"),),
+        "when its clock was zero, s since 1970 UTC",
+        "no SYSTEM_TIME with UTC",
+        waits=False,
+    ),
     "home.lat": Name((("home", "lat"),), "latitude of home, deg", "no HOME_POSITION"),
     "home.lon": Name((("home", "lon"),), "longitude of home, deg", "no HOME_POSITION"),
     "home.alt_msl": Name(
@@ -282,11 +293,20 @@ NAMES: dict[str, Name] = {
         "neither HOME_POSITION nor GLOBAL_POSITION_INT",
     ),
     **{
-        f"origin.{quantity}": Name((("origin", quantity),), meaning, "no GPS_GLOBAL_ORIGIN")
+        f"origin.{quantity}": Name((("origin", quantity),), meaning, _ORIGIN)
         for quantity, meaning in {
+            "id": "running number among the origins of the vehicle",
             "lat": "latitude of the local origin, deg",
             "lon": "longitude of the local origin, deg",
             "alt_msl": "height of the local origin above mean sea level, m",
+        }.items()
+    },
+    **{
+        f"launch.{quantity}": Name((("launch", quantity),), meaning, _LAUNCH, waits=False)
+        for quantity, meaning in {
+            "lat": "latitude where the vehicle was armed last, deg",
+            "lon": "longitude where it was armed last, deg",
+            "alt_msl": "height where it was armed last, above mean sea level, m",
         }.items()
     },
     **_names(
@@ -341,7 +361,7 @@ Quantities = dict[str, Any]
 
 def histories() -> dict[str, tuple[str, ...]]:
     """Return history -> its quantities."""
-    found: dict[str, dict[str, None]] = {}
+    found = {name: dict.fromkeys(quantities) for name, quantities in REGISTERED.items()}
     for source in SOURCES:
         found.setdefault(source.history, {}).update(dict.fromkeys(source.reads))
     return {history: tuple(quantities) for history, quantities in found.items()}

@@ -15,7 +15,7 @@ Values = npt.NDArray[Any]
 
 LATE_FRAMES = 20_000
 LATE_US = 60_000_000
-"""A value may come this much later than the row it is needed for (frames, and us of receive time)."""
+"""A value may come this much later than the row it is needed for (frames, and us of the recording's time)."""
 
 _NUMBER_BITS = 38
 _NEVER = np.iinfo(np.int64).max
@@ -28,8 +28,12 @@ class Asked(NamedTuple):
     """System, sender, or system and command; negative where it is not known whom the row is about."""
     number: Ints
     """Running number of the frame."""
+    since: Ints
+    """The same, or of the frame that told whom the row is about: what is asked for is the value then."""
     t_us: Ints
     t_valid: Bools
+    clock_us: Ints
+    """Time of the recording, which never goes back: so what is late does not become early again."""
 
 
 class Answer(NamedTuple):
@@ -52,6 +56,7 @@ class History:
         self._order: Ints = np.zeros(0, np.int64)
         self._t_us: Ints = np.zeros(0, np.int64)
         self._t_valid: Bools = np.zeros(0, np.bool_)
+        self._clock_us: Ints = np.zeros(0, np.int64)
         self._values: dict[str, Values] = {name: np.zeros(0) for name in quantities}
 
     def extend(self, key: Ints, frames: Frames, values: dict[str, Values]) -> None:
@@ -61,6 +66,7 @@ class History:
         self._order = order[by]
         self._t_us = np.concatenate((self._t_us, frames.t_us))[by]
         self._t_valid = np.concatenate((self._t_valid, frames.t_valid))[by]
+        self._clock_us = np.concatenate((self._clock_us, frames.clock_us))[by]
         for name, old in self._values.items():
             new = values.get(name)
             blank = np.full(len(key), np.nan) if new is None else new
@@ -75,11 +81,12 @@ class History:
             self._t_us[last],
             self._t_valid[last],
         )
+        self._clock_us = self._clock_us[last]
         self._values = {name: values[last] for name, values in self._values.items()}
 
     def before(self, asked: Asked, max_age_us: int | None = None) -> Answer:
         """Find the last value said before each row, no older than `max_age_us`."""
-        wanted = asked.key << _NUMBER_BITS | asked.number
+        wanted = asked.key << _NUMBER_BITS | asked.since
         place = np.searchsorted(self._order, wanted, side="left") - 1
         answer = self._answer(asked, place, np.asarray(place >= 0))
         if max_age_us is None or not len(self._order):
@@ -88,15 +95,14 @@ class History:
 
     def after(self, asked: Asked, max_delay_us: int = LATE_US) -> Answer:
         """Find the first value said soon after each row."""
-        wanted = asked.key << _NUMBER_BITS | asked.number
+        wanted = asked.key << _NUMBER_BITS | asked.since
         place = np.searchsorted(self._order, wanted, side="left")
         answer = self._answer(asked, place, np.asarray(place < len(self._order)))
         if not len(self._order):
             return answer
         soon = answer.number - asked.number <= LATE_FRAMES
-        return answer._replace(
-            found=answer.found & soon & self._near(asked, answer.place, max_delay_us)
-        )
+        soon &= self._clock_us[answer.place] - asked.clock_us <= max_delay_us
+        return answer._replace(found=answer.found & soon)
 
     def _answer(self, asked: Asked, place: Ints, inside: Bools) -> Answer:
         if not len(self._order):

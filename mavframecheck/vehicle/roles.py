@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import functools
 import re
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.semantics.constants import constant
-from mavframecheck.wire import Table
+from mavframecheck.vehicle.history import LATE_FRAMES, LATE_US
+from mavframecheck.wire import Frames, Table
 
 Ints = npt.NDArray[np.int64]
+_NUMBER_BITS = 38
+_NUMBER = (1 << _NUMBER_BITS) - 1
+_NEVER = np.int64(1 << 62)
 
 ROLES = ("unknown", "autopilot", "gcs", "companion", "camera", "gimbal", "adsb")
 
@@ -65,65 +70,82 @@ def role_table() -> npt.NDArray[np.int64]:
     return table
 
 
+class Meant(NamedTuple):
+    """Whom rows are about; all (n,)."""
+
+    system: Ints
+    """Negative where it is not known."""
+    since: Ints
+    """Running number of the frame from which on that could be known: the row, or the first heartbeat behind it."""
+
+
 class RoleBook:
     """The role of every sender over time, and which systems have an autopilot."""
 
     def __init__(self) -> None:
         """Start with the convention of ids."""
-        self._now = role_table().copy()
-        """(65536,) role of each sender before the current batch."""
-        self._later = self._now
-        """The same after it."""
-        self._changes: Table | None = None
-        self._autopilots: dict[int, int] = {}
-        """System -> running number of the first heartbeat of its autopilot."""
+        self._before = role_table().copy()
+        """(65536,) role of each sender before the changes that are kept."""
+        self._now = self._before.copy()
+        """(65536,) the latest."""
+        self._order: Ints = np.zeros(0, np.int64)
+        """Sender and frame number of the heartbeats of late, as one number, ascending."""
+        self._role: Ints = np.zeros(0, np.int64)
+        self._first_number = np.full(256, _NEVER)
+        self._first_clock_us = np.full(256, _NEVER)
+        """(256,) number and time of the first heartbeat of each system's autopilot."""
 
     def update(self, heartbeats: Table) -> None:
         """Take in the heartbeats of a batch."""
-        role, sender = _roles_of(heartbeats), heartbeats.frames.sender
-        self._later = self._now.copy()
-        self._later[sender] = role
-        if (self._now[sender] != role).any():
-            self._changes = heartbeats
+        frames, role = heartbeats.frames, _roles_of(heartbeats)
+        order = np.concatenate((self._order, frames.sender << _NUMBER_BITS | frames.number))
+        by = np.argsort(order)
+        self._order, self._role = order[by], np.concatenate((self._role, role))[by]
+        self._now[frames.sender] = role
         speaks = np.flatnonzero(role == ROLES.index("autopilot"))
-        for row in speaks[np.unique(sender[speaks], return_index=True)[1]].tolist():
-            system = int(heartbeats.frames.sysid[row])
-            self._autopilots.setdefault(system, int(heartbeats.frames.number[row]))
+        for row in speaks[np.unique(frames.sysid[speaks], return_index=True)[1]].tolist():
+            system = int(frames.sysid[row])
+            if self._first_number[system] == _NEVER:
+                self._first_number[system] = frames.number[row]
+                self._first_clock_us[system] = frames.clock_us[row]
 
-    def settle(self) -> None:
-        """Take the batch as past."""
-        self._now, self._changes = self._later, None
+    def settle(self, number: int) -> None:
+        """Forget, when frame `number` was the last one, what no waiting row can ask for."""
+        if not len(self._order):
+            return
+        old = (self._order & _NUMBER) < number - LATE_FRAMES
+        self._before[self._order[old] >> _NUMBER_BITS] = self._role[old]
+        self._order, self._role = self._order[~old], self._role[~old]
 
     def last(self, sender: int) -> int:
         """Return the latest role of a sender, as a place in ROLES."""
-        return int(self._later[sender])
+        return int(self._now[sender])
 
     def of(self, table: Table) -> Ints:
         """Return (n,) the role of each sender before each row, as a place in ROLES."""
         sender = table.frames.sender
-        role: Ints = self._now[sender]
-        if self._changes is None:
+        role: Ints = self._before[sender]
+        if (self._role == self._before[self._order >> _NUMBER_BITS]).all():
             return role
-        said, by = _roles_of(self._changes), self._changes.frames
-        for changed in np.unique(by.sender[said != self._now[by.sender]]).tolist():
-            rows = np.flatnonzero(sender == changed)
-            own = by.sender == changed
-            before = np.searchsorted(by.number[own], table.frames.number[rows]) - 1
-            role[rows] = np.where(before >= 0, said[own][np.maximum(before, 0)], role[rows])
-        return role
+        place = np.searchsorted(self._order, sender << _NUMBER_BITS | table.frames.number) - 1
+        at = np.maximum(place, 0)
+        said = (place >= 0) & (self._order[at] >> _NUMBER_BITS == sender)
+        return np.where(said, self._role[at], role)
 
-    def autopilot_for(self, sysid: Ints, number: Ints) -> Ints:
+    def autopilot_for(self, frames: Frames) -> Meant:
         """Return the sender's own system where its autopilot was heard, else the only one heard.
 
-        Where none was heard yet it is the one that is heard first; negative where it is not known.
+        Where none was heard yet it is the one that is heard first, and soon.
         """
-        if not self._autopilots:
-            return np.full(len(sysid), -1, np.int64)
-        heard_from = np.full(256, np.iinfo(np.int64).max)
-        heard_from[list(self._autopilots)] = list(self._autopilots.values())
-        heard = np.searchsorted(np.sort(list(self._autopilots.values())), number, side="right")
-        only = np.where(heard <= 1, np.argmin(heard_from), -1)
-        return np.where(heard_from[sysid] <= number, sysid, only)
+        number, sysid = frames.number, frames.sysid
+        first = int(np.argmin(self._first_number))
+        heard = np.searchsorted(np.sort(self._first_number), number, side="right")
+        soon = self._first_number[first] - number <= LATE_FRAMES
+        soon &= self._first_clock_us[first] - frames.clock_us <= LATE_US
+        only = np.where((heard == 1) | ((heard == 0) & soon), first, -1)
+        own = self._first_number[sysid] <= number
+        since = np.where((heard == 0) & soon, self._first_number[first], number)
+        return Meant(np.where(own, sysid, only), np.where(own, number, since))
 
 
 def _roles_of(heartbeats: Table) -> Ints:

@@ -11,6 +11,7 @@ import pytest
 from pymavlink import mavutil
 
 from benchmarks.injection import judge
+from benchmarks.injection.__main__ import show
 from benchmarks.injection.log import Change, Log, put
 from benchmarks.injection.make import with_mistake, with_streams
 from benchmarks.injection.places import Place, moved
@@ -171,6 +172,33 @@ def test_a_mistake_that_no_rule_sees_is_missed(log: Log) -> None:
     (missed,) = judge._outcomes(log, "sample", unseen, [])
 
     assert missed.word == "missed"
+
+
+OUTCOMES: dict[str, judge.Outcome] = {
+    "found": judge.Outcome("plain degrees", "sample", "found", 5, 5),
+    "missed": judge.Outcome("plain degrees", "sample", "missed", 0, 5),
+    "silent": judge.Outcome("plain degrees", "sample", "silent", 0, 5),
+    "wrong": judge.Outcome("plain degrees", "sample", "wrong", 1, 5),
+}
+
+
+@pytest.mark.parametrize(
+    ("words", "alarms", "good"),
+    [
+        (["found", "silent"], [], True),
+        (["silent"], [], True),
+        (["found"] * 98 + ["missed"] * 2, [], False),
+        (["found"] * 99 + ["missed"], [], True),
+        (["found", "wrong"], [], False),
+        (["found"], ["sample: error MFC302"], False),
+    ],
+)
+def test_a_short_recall_a_wrong_finding_or_an_alarm_fails(
+    plan: Plan, words: list[str], alarms: list[str], good: bool
+) -> None:
+    verdicts = judge.Verdicts([OUTCOMES[word] for word in words], alarms, 1)
+
+    assert show(plan, [DEGREES], verdicts, everything=False) is good
 
 
 @pytest.fixture(scope="module")

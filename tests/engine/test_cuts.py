@@ -136,7 +136,7 @@ IN_CONTEXT = rule(
 """It waits for context, and judges without it where none comes."""
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(data=traffic(), cuts=st.lists(st.integers(0, 3000), min_size=1, max_size=12))
 def test_any_traffic(data: bytes, cuts: list[int]) -> None:
     """Several vehicles, roles that change, context before, after, late or never, clocks that leap."""

@@ -69,9 +69,7 @@ def test_where_nose_and_wing_point(
 
 def test_axes_of_a_place() -> None:
     """At 0 N 0 E north is z, east is y and down points to the centre."""
-    np.testing.assert_allclose(
-        ned_from_ecef(0, 0), [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], atol=1e-15
-    )
+    np.testing.assert_allclose(ned_from_ecef(0, 0), [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], atol=1e-15)
     np.testing.assert_allclose(ned_from_ecef(90, 0)[2], [0, 0, -1], atol=1e-15)
     assert ned_from_ecef(np.zeros((4, 2)), 10.0).shape == (4, 2, 3, 3)
 

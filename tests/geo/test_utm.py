@@ -24,7 +24,7 @@ LONGITUDES = st.floats(-180, 179.999)
         *((0, -180, 1), (0, 180, 1), (0, 179.9, 60), (0, 0, 31), (0, -0.1, 30), (52, 21, 34)),
         *((60, 2.9, 31), (60, 5, 32), (55.9, 5, 31), (64, 5, 31)),
         *((78, 8.9, 31), (78, 9, 33), (78.2, 15.6, 33), (78, 21, 35), (78, 33, 37), (78, 42, 38)),
-        *((84.1, 0, 0), (-80.1, 0, 0), (np.nan, 0, 0), (0, np.nan, 0), (0, 541, 31)),
+        *((84.1, 0, 0), (-80.1, 0, 0), (np.nan, 0, 0), (0, np.nan, 0), (0, 361, 31), (0, 541, 1)),
     ],
 )
 def test_zones(lat: float, lon: float, number: int) -> None:
@@ -59,5 +59,7 @@ def test_without_the_package() -> None:
         "assert zone(52, 21) == 34\n"
         "utm_from_geodetic(52, 21, 34, north=True)"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", program], check=False, capture_output=True, text=True
+    )
     assert "pip install 'mavframecheck[utm]'" in done.stderr.splitlines()[-1]

@@ -1,0 +1,131 @@
+"""Tracks as series on one time line, and what they say between their samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from mavframecheck.geo import quaternions
+from mavframecheck.vehicle.pairs import metres
+from mavframecheck.vehicle.tracks import (
+    ATTITUDE,
+    PLACE,
+    STAMP,
+    TIME,
+    VELOCITY,
+    Track,
+)
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+GAP_S = 1.6
+"""Nothing is read between samples further apart than this, s: positions come once a second at the least."""
+APART_M = 1e7
+"""What lies behind a reset is put this far away, m, so that no step leads across it: see `Series.steps`."""
+RESET_M = 0.5
+"""What moved further than this, m, ..."""
+RESET_TIMES = 8.0
+"""... and so many times further than from sample to sample elsewhere, jumped."""
+
+
+@dataclass(slots=True)
+class Series:
+    """Samples of one stream; positions NED (or what the stream takes for it), attitudes `ned_from_frd`."""
+
+    message: str
+    t: Floats
+    """(n,) receive time, s, ascending."""
+    place: Floats
+    """(n, 3) m."""
+    attitude: Floats
+    """(n, 4)."""
+    velocity: Floats
+    """(n, 3) m/s."""
+    stamp: Floats
+    """(n,) s."""
+
+    def places(self, at: Floats) -> Floats:
+        """Return (k, 3) positions at times `at`, NaN across gaps and resets."""
+        given = np.isfinite(self.place[:, :2]).all(axis=1)
+        return _between(self.t[given], self.place[given], at, _resets(self.place[given]))
+
+    def velocities(self, at: Floats) -> Floats:
+        """Return (k, 3) velocities at times `at`, NaN across gaps."""
+        given = np.isfinite(self.velocity).all(axis=1)
+        return _between(self.t[given], self.velocity[given], at)
+
+    def attitudes(self, at: Floats) -> Floats:
+        """Return (k, 4) attitudes at times `at`, NaN across gaps."""
+        given = np.isfinite(self.attitude).all(axis=1)
+        t, q = self.t[given], self.attitude[given]
+        if len(t) < 2:
+            return np.full((len(at), 4), np.nan)
+        k, share, near = _places_in(t, at)
+        turned = quaternions.between(share, q[k], q[k + 1])
+        return np.where(near[:, np.newaxis], turned, np.nan)
+
+    def steps(self, at: Floats, span_s: float) -> Floats:
+        """Return (k, 3) how far it went in the `span_s` around times `at`, m, NaN across gaps."""
+        went = self.places(at + span_s / 2) - self.places(at - span_s / 2)
+        return np.where(np.abs(went).max(axis=1, keepdims=True) < APART_M / 2, went, np.nan)
+
+    def integrated(self, rate: float) -> Series:
+        """Return the same with a position that its velocity adds up to; `rate` is vehicle per receive time."""
+        given = np.isfinite(self.velocity).all(axis=1)
+        t, v = self.t[given], self.velocity[given]
+        went = np.zeros_like(v)
+        if len(t) > 1:
+            dt = np.minimum(np.diff(t), GAP_S)[:, np.newaxis] * rate
+            went[1:] = np.cumsum((v[1:] + v[:-1]) / 2 * dt, axis=0)
+        return Series(self.message, t, went, self.attitude[given], v, self.stamp[given])
+
+
+def _places_in(t: Floats, at: Floats) -> tuple[npt.NDArray[np.int64], Floats, Bools]:
+    """Return (k,) the sample before each time, the share of the way to the next, and whether that is near."""
+    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    apart = np.maximum(t[k + 1] - t[k], 1e-9)
+    share = (at - t[k]) / apart
+    near = (share >= 0) & (share <= 1) & (apart <= GAP_S)
+    return k, np.clip(share, 0, 1), np.asarray(near)
+
+
+def _between(t: Floats, values: Floats, at: Floats, torn: Bools | None = None) -> Floats:
+    if len(t) < 2:
+        return np.full((len(at), values.shape[1]), np.nan)
+    k, share, near = _places_in(t, at)
+    if torn is not None:
+        values = values + (np.concatenate(([0.0], np.cumsum(torn))) * APART_M)[:, np.newaxis]
+        near &= ~torn[k]
+    found = values[k] + share[:, np.newaxis] * (values[k + 1] - values[k])
+    return np.where(near[:, np.newaxis], found, np.nan)
+
+
+def _resets(place: Floats) -> Bools:
+    """Return (n - 1,) steps between neighbours that are no motion."""
+    went = np.linalg.norm(np.nan_to_num(np.diff(place, axis=0)), axis=1)
+    if not len(went):
+        return np.zeros(0, np.bool_)
+    moving = went[went > 0]
+    usual = float(np.percentile(moving, 95)) if len(moving) else 0.0
+    return np.asarray(went > np.maximum(RESET_M, RESET_TIMES * usual))
+
+
+def series_of(track: Track) -> Series:
+    """Return the samples of a track; geodetic positions become metres from the first one."""
+    rows = track.samples()
+    rows = rows[np.argsort(rows[:, TIME], kind="stable")]
+    place = rows[:, PLACE]
+    if track.source.geodetic and len(place):
+        north, east = metres(place[:, 0], place[:, 1], place[:1, 0], place[:1, 1])
+        place = np.column_stack((north, east, place[:1, 2] - place[:, 2]))
+    attitude = rows[:, ATTITUDE]
+    if track.source.euler:
+        attitude = quaternions.quaternion_from_euler(*attitude[:, :3].T)
+    else:
+        attitude = quaternions.unit(attitude)
+    return Series(
+        track.key.message, rows[:, TIME], place, attitude, rows[:, VELOCITY], rows[:, STAMP]
+    )

@@ -1,0 +1,290 @@
+"""What every stream says of where a vehicle is, how it lies and how it moves: samples kept for comparison.
+
+A track keeps at most 20 samples a second, in windows of 10 s of receive time. When a recording grows, every
+second window is dropped, so that what is kept is spread evenly, memory stays flat, and nothing depends on
+where batches are cut. Samples with receive times that cannot be believed, or that go back, are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mavframecheck.vehicle.clocks import Seen, seen
+from mavframecheck.wire import Batch, Table
+
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.float64]
+
+BIN_US = 50_000
+"""One sample of a stream is kept in each of these, us."""
+WINDOW_BINS = 200
+MAX_WINDOWS = 128
+MAX_TRACKS = 64
+"""Streams that are followed, in the order in which they are first heard."""
+LATE_US = 100_000
+"""A receive time may lie this far behind the latest one, us."""
+_DEG = 1e-7
+
+COLUMNS = 15
+TIME, STAMP = 0, 1
+PLACE, ATTITUDE, VELOCITY, RATES = slice(2, 5), slice(5, 9), slice(9, 12), slice(12, 15)
+"""Columns of a sample: receive time (s since the first of the recording), stamp (s), position (m, or
+degrees and m), attitude (a quaternion, or roll, pitch, yaw and NaN), velocity (m/s), rates (rad/s)."""
+
+Reader = Callable[[Table], Floats]
+
+
+class Source(NamedTuple):
+    """How a message says it; readers return (n, k) columns, and NaN where it does not say."""
+
+    place: Reader | None = None
+    attitude: Reader | None = None
+    velocity: Reader | None = None
+    rates: Reader | None = None
+    stamp: Reader | None = None
+    geodetic: bool = False
+    """Whether the position is latitude, longitude and altitude."""
+    euler: bool = False
+    """Whether the attitude is roll, pitch and yaw."""
+    valid: Callable[[Table], Bools] | None = None
+    variant: tuple[str, ...] = ()
+    """Fields that choose the frame, or the instance."""
+
+
+def _fields(*names: str, scale: float = 1.0) -> Reader:
+    return lambda table: np.column_stack([table[name] * scale for name in names])
+
+
+def _array(name: str) -> Reader:
+    def read(table: Table) -> Floats:
+        q = table[name].astype(np.float64)
+        return np.where(np.any(q != 0, axis=1, keepdims=True), q, np.nan)
+
+    return read
+
+
+def _geodetic(lat: str, lon: str, alt: str = "", scale: float = 1e-3) -> Reader:
+    def read(table: Table) -> Floats:
+        height = table[alt] * scale if alt else np.full(len(table), np.nan)
+        return np.column_stack((table[lat] * _DEG, table[lon] * _DEG, height))
+
+    return read
+
+
+def _unless(reader: Reader, ignored: Callable[[Table], Bools]) -> Reader:
+    return lambda table: np.where(ignored(table)[:, np.newaxis], np.nan, reader(table))
+
+
+def _bit(field_name: str, bit: int) -> Callable[[Table], Bools]:
+    return lambda table: np.asarray(table[field_name] & bit != 0)
+
+
+def _placed(lat: str, lon: str) -> Callable[[Table], Bools]:
+    return lambda table: np.asarray((table[lat] != 0) | (table[lon] != 0))
+
+
+def _fixed(table: Table) -> Bools:
+    return np.asarray((table["fix_type"] >= 3) & ((table["lat"] != 0) | (table["lon"] != 0)))
+
+
+_XYZ = _fields("x", "y", "z")
+_VXYZ = _fields("vx", "vy", "vz")
+_RPY = _fields("roll", "pitch", "yaw")
+_VELOCITY_IGNORED = 8 | 16
+"""Bits of GPS_INPUT.ignore_flags: horizontal and vertical velocity."""
+_USEC = _fields("usec", scale=1e-6)
+_TIME_USEC = _fields("time_usec", scale=1e-6)
+_BOOT_MS = _fields("time_boot_ms", scale=1e-3)
+
+SOURCES: dict[str, Source] = {
+    "GLOBAL_POSITION_INT": Source(
+        place=_geodetic("lat", "lon", "alt"),
+        velocity=_fields("vx", "vy", "vz", scale=1e-2),
+        stamp=_BOOT_MS,
+        geodetic=True,
+        valid=_placed("lat", "lon"),
+    ),
+    "LOCAL_POSITION_NED": Source(place=_XYZ, velocity=_VXYZ, stamp=_BOOT_MS),
+    "GPS_RAW_INT": Source(place=_geodetic("lat", "lon", "alt"), geodetic=True, valid=_fixed),
+    "SIMSTATE": Source(place=_geodetic("lat", "lng"), geodetic=True, valid=_placed("lat", "lng")),
+    "ATTITUDE": Source(
+        attitude=_RPY,
+        rates=_fields("rollspeed", "pitchspeed", "yawspeed"),
+        stamp=_BOOT_MS,
+        euler=True,
+    ),
+    "ATTITUDE_QUATERNION": Source(attitude=_fields("q1", "q2", "q3", "q4"), stamp=_BOOT_MS),
+    **{
+        name: Source(place=_XYZ, attitude=_RPY, stamp=_USEC, euler=True)
+        for name in (
+            "VISION_POSITION_ESTIMATE",
+            "GLOBAL_VISION_POSITION_ESTIMATE",
+            "VICON_POSITION_ESTIMATE",
+        )
+    },
+    "VISION_SPEED_ESTIMATE": Source(velocity=_XYZ, stamp=_USEC),
+    "ATT_POS_MOCAP": Source(place=_XYZ, attitude=_array("q"), stamp=_TIME_USEC),
+    "ODOMETRY": Source(
+        place=_XYZ,
+        attitude=_array("q"),
+        velocity=_VXYZ,
+        rates=_fields("rollspeed", "pitchspeed", "yawspeed"),
+        stamp=_TIME_USEC,
+        variant=("frame_id", "child_frame_id"),
+    ),
+    "GPS_INPUT": Source(
+        velocity=_unless(
+            _fields("vn", "ve", "vd"),
+            _bit("ignore_flags", _VELOCITY_IGNORED),
+        ),
+        stamp=_TIME_USEC,
+        valid=lambda table: np.asarray(table["fix_type"] >= 3),
+        variant=("gps_id",),
+    ),
+    "HIL_GPS": Source(
+        velocity=_fields("vn", "ve", "vd", scale=1e-2),
+        stamp=_TIME_USEC,
+        valid=lambda table: np.asarray(table["fix_type"] >= 3),
+        variant=("id",),
+    ),
+}
+"""Messages that are followed."""
+
+
+class TrackKey(NamedTuple):
+    """One stream."""
+
+    sender: int
+    """``sysid * 256 + compid``."""
+    message: str
+    variant: tuple[int, ...] = ()
+    """Values of the source's variant fields."""
+
+
+@dataclass(slots=True)
+class Track:
+    """The samples of one stream."""
+
+    key: TrackKey
+    source: Source
+    first: Seen
+    last: Seen
+    rows: int = 0
+    parts: list[Floats] = field(default_factory=list)
+    kept: list[Ints] = field(default_factory=list)
+    """Bins of the samples in each part."""
+    last_bin: int = -1
+    level: int = 0
+
+    def add(self, table: Table, bins: Ints, t_s: Floats) -> None:
+        """Take in further rows, in the `bins` they fall into."""
+        self.rows += len(table)
+        self.last = seen(table.frames, -1)
+        fresh = np.flatnonzero(np.diff(np.maximum.accumulate(bins), prepend=self.last_bin) > 0)
+        fresh = fresh[bins[fresh] > self.last_bin]
+        if not len(fresh):
+            return
+        self.last_bin = int(bins[fresh[-1]])
+        self.parts.append(_samples(self.source, table.take(fresh), t_s[fresh]))
+        self.kept.append(bins[fresh])
+
+    def coarsen(self, level: int) -> None:
+        """Keep every ``2 ** level``-th window."""
+        if level > self.level or (level and self.parts):
+            bins, samples = self._joined()
+            stays = (bins // WINDOW_BINS) % (1 << level) == 0
+            self.kept, self.parts, self.level = [bins[stays]], [samples[stays]], level
+
+    def _joined(self) -> tuple[Ints, Floats]:
+        if not self.parts:
+            return np.zeros(0, np.int64), np.zeros((0, COLUMNS))
+        return np.concatenate(self.kept), np.concatenate(self.parts)
+
+    def samples(self) -> Floats:
+        """Return (n, COLUMNS) all that is kept, in the order of time."""
+        return self._joined()[1]
+
+
+def _samples(source: Source, table: Table, t_s: Floats) -> Floats:
+    rows = np.full((len(table), COLUMNS), np.nan)
+    rows[:, TIME] = t_s
+    readers = (
+        (slice(STAMP, STAMP + 1), source.stamp),
+        (PLACE, source.place),
+        (ATTITUDE, source.attitude),
+        (VELOCITY, source.velocity),
+        (RATES, source.rates),
+    )
+    for columns, reader in readers:
+        if reader is not None:
+            values = reader(table)
+            rows[:, columns.start : columns.start + values.shape[1]] = values
+    return rows
+
+
+class Tracks:
+    """The tracks of all streams of a recording that say where something is."""
+
+    def __init__(self) -> None:
+        """Start with nothing heard."""
+        self.tracks: dict[TrackKey, Track] = {}
+        self.timed = False
+        """Whether there were receive times that can be believed."""
+        self._t0_us: int | None = None
+        self._level = 0
+
+    def update(self, batch: Batch) -> None:
+        """Take in what a batch says."""
+        for key, table in sorted(self._streams(batch), key=lambda each: _number(each[1])):
+            self._add(key, table)
+        for track in self.tracks.values():
+            track.coarsen(self._level)
+
+    def _streams(self, batch: Batch) -> Iterator[tuple[TrackKey, Table]]:
+        frames = batch.frames
+        if self._t0_us is None and frames.t_valid.any():
+            self._t0_us = int(frames.t_us[np.argmax(frames.t_valid)])
+            self.timed = True
+        for name in batch.tables.keys() & SOURCES.keys():
+            table = batch.tables[name]
+            source = SOURCES[name]
+            good = table.frames.t_valid & (table.frames.t_us >= table.frames.clock_us - LATE_US)
+            if source.valid is not None:
+                good &= source.valid(table)
+            if good.any():
+                yield from _split(source, table if good.all() else table.take(good))
+
+    def _add(self, key: TrackKey, table: Table) -> None:
+        track = self.tracks.get(key)
+        if track is None:
+            if len(self.tracks) >= MAX_TRACKS:
+                return
+            at = seen(table.frames, 0)
+            track = self.tracks[key] = Track(key, SOURCES[key.message], at, at)
+        since = table.frames.t_us - (self._t0_us or 0)
+        bins = np.maximum(since // BIN_US, 0)
+        while int(bins.max()) // WINDOW_BINS >> self._level >= MAX_WINDOWS:
+            self._level += 1
+        track.add(table, bins, since * 1e-6)
+
+
+def _number(table: Table) -> int:
+    return int(table.frames.number[0])
+
+
+def _split(source: Source, table: Table) -> Iterator[tuple[TrackKey, Table]]:
+    """Yield the rows of each sender and variant."""
+    columns = [table.frames.sender, *(table[name].astype(np.int64) for name in source.variant)]
+    keys = np.column_stack(columns)
+    if (keys == keys[0]).all():
+        yield TrackKey(int(keys[0, 0]), table.name, tuple(keys[0, 1:].tolist())), table
+        return
+    for each in np.unique(keys, axis=0):
+        sender, *variant = each.tolist()
+        yield TrackKey(sender, table.name, tuple(variant)), table.take((keys == each).all(axis=1))
