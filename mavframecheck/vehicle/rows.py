@@ -91,22 +91,6 @@ class Rows:
         stream = table.frames.sender
         if "target_system" in table.layout.by_name:
             stream = stream * 256 + self.raw("target_system")
-        fields = (tag.instance_field for tag in catalogue.tags(table.name))
-        instance = next(filter(None, fields), "")
-        if instance in table.layout.by_name and table[instance].dtype.kind in "iu":
-            stream = stream * 2**16 + (self.raw(instance) & 0xFFFF)
-        return np.asarray(stream, np.int64)
-
-    @property
-    def stream(self) -> Ints:
-        """(n,) sender, target and instance as one number: rows of one number follow each other."""
-        return self.cached(("stream",), self._stream)
-
-    def _stream(self) -> Ints:
-        table = self.table
-        stream = table.frames.sender
-        if "target_system" in table.layout.by_name:
-            stream = stream * 256 + self.raw("target_system")
         tags = catalogue.tags(table.name)
         instance = next((tag.instance_field for tag in tags if tag.instance_field), "")
         if instance in table.layout.by_name and table[instance].dtype.kind in "iu":
