@@ -251,7 +251,7 @@ SAMPLES = (
     ),
     Sample(
         "float_location_command.tlog",
-        ("MFC301",),
+        ("MFC118", "MFC301"),
         "A region of interest as float32 degrees: up to a metre is lost.",
         float_command(195, 47.397842, 8.545694, 10.0),
     ),
@@ -263,7 +263,7 @@ SAMPLES = (
     ),
     Sample(
         "scaled_degrees_in_float_field.tlog",
-        ("MFC303",),
+        ("MFC118", "MFC303"),
         "Degrees times 1e7 where plain degrees belong.",
         float_command(179, 473978420.0, 85456940.0, 488.0),
     ),
@@ -272,6 +272,30 @@ SAMPLES = (
         ("MFC304",),
         "Degrees scaled twice: both fields saturate.",
         faulty_global(lat_int=2**31 - 1, lon_int=2**31 - 1),
+    ),
+    Sample(
+        "swapped_coordinates.tlog",
+        ("MFC305",),
+        "Longitude first, latitude second.",
+        faulty_global(lat_int=85455940, lon_int=473977420),
+    ),
+    Sample(
+        "relative_height_in_absolute_frame.tlog",
+        ("MFC201",),
+        "A height above home (12 m) in a frame that counts from mean sea level (home: 488 m).",
+        faulty_global(coordinate_frame=0, alt=12.0),
+    ),
+    Sample(
+        "absolute_height_in_relative_frame.tlog",
+        ("MFC202",),
+        "A height above mean sea level in a frame that counts from home.",
+        faulty_global(coordinate_frame=3, alt=500.0),
+    ),
+    Sample(
+        "inverted_type_mask.tlog",
+        ("MFC105",),
+        "The mask marks what is given as ignored, and what is not as used.",
+        faulty_field(SETPOINT, values(type_mask=0x0007)),
     ),
     Sample(
         "metres_not_scaled.tlog",
