@@ -7,7 +7,7 @@ CORPUS ?= ../shared/corpus
 BASELINE ?= build/corpus-baseline.jsonl
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check generate samples bench accuracy corpus-frames corpus-diff clean
+.PHONY: help demo test check generate samples bench accuracy injection corpus-frames corpus-diff clean
 
 help:  ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -42,6 +42,9 @@ bench: $(READY)  ## speed and memory against the required figures (about five mi
 
 accuracy: $(READY)  ## found, missed and false alarms on the labelled recordings
 	$(BIN)/python -m benchmarks.accuracy --corpus $(CORPUS)
+
+injection: $(READY)  ## mistakes written into clean recordings: which are found (about four minutes)
+	$(BIN)/python -m benchmarks.injection --corpus $(CORPUS) $(if $(ONLY),--only $(ONLY))
 
 corpus-frames: $(READY)  ## every frame of every recording against pymavlink (about three minutes)
 	MAVFRAMECHECK_FULL_CORPUS=1 $(BIN)/python -m pytest -q -s tests/wire/test_corpus.py

@@ -58,10 +58,8 @@ def listed(rows: Rows, message: str, key: str, values: Any) -> Any:
     """
 
     def of(family: str, version: float, command: int | None, value: int) -> str:
-        known = acceptance.numbers(family, message, key, command, version)
-        if known is None:
-            return "unknown"
-        return "yes" if value in known else "no"
+        held = acceptance.member(family, message, key, value, command, version)
+        return {True: "yes", False: "no", None: "unknown"}[held]
 
     return _column(rows, np.broadcast_to(values, len(rows)), of)
 

@@ -174,6 +174,21 @@ def numbers(
     return frozenset(found.value)
 
 
+def member(
+    family: str,
+    subject: str,
+    key: str,
+    value: int,
+    command: int | None = None,
+    version: float = math.nan,
+) -> bool | None:
+    """Return whether a set of numbers holds `value`: in every version in question, in none, or None."""
+    found = _entries_by_version(family, subject, key, command, _version(version))
+    sets = [entry.facts[key] for entry in found]
+    held = {value in numbers for numbers in sets if isinstance(numbers, tuple)}
+    return held.pop() if len(held) == 1 else None
+
+
 def families() -> tuple[str, ...]:
     """Return the autopilots that there is a file for."""
     return tuple(_stacks())
@@ -222,13 +237,20 @@ def _verdict(
 def _fact(
     family: str, subject: str, key: str, command: int | None, version: float | None
 ) -> Fact | None:
-    entries = _about(family, subject, command)
-    found = _by_version(entries, version, lambda now: _first(e for e in now if key in e.facts))
+    found = _entries_by_version(family, subject, key, command, version)
     if not found:
         return None
     newest = found[-1]
     agreed = len({entry.facts[key] for entry in found}) == 1
     return Fact(newest.facts[key], agreed, newest.note, newest.source)
+
+
+def _entries_by_version(
+    family: str, subject: str, key: str, command: int | None, version: float | None
+) -> list[Entry]:
+    """Return what states a fact at `version`, or at each version that is told apart."""
+    entries = _about(family, subject, command)
+    return _by_version(entries, version, lambda now: _first(e for e in now if key in e.facts))
 
 
 def _by_version(

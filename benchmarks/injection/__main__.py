@@ -1,0 +1,128 @@
+"""`make injection`: mistakes written into the bytes of clean recordings, and which of them the rules find.
+
+`benchmarks/expected.toml` says what is written where, which codes answer it, and where the method can decide.
+Recordings are also flown elsewhere: near sea level, at 500 m and at 2 000 m, in all hemispheres. Every recording
+is judged first as it is, with clean streams added: an error or warning there is a false alarm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
+from pathlib import Path
+
+from benchmarks.corpus import arguments, is_absent
+from benchmarks.injection.judge import FAMILIES, Outcome, Verdicts, judge_variant, known_rules
+from benchmarks.injection.plan import Mistake, Plan, read_plan
+
+REQUIRED_RECALL = 0.99
+"""Of the cases of each mistake in which the method can decide."""
+
+
+def options() -> argparse.Namespace:
+    """Return the command line."""
+    parser = arguments(__doc__ or "")
+    parser.add_argument("--only", nargs="*", default=[], help="codes, or beginnings of codes")
+    parser.add_argument("--recording", nargs="*", default=[], help="beginnings of names")
+    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
+    parser.add_argument("--all", action="store_true", help="print every case")
+    return parser.parse_args()
+
+
+def chosen(plan: Plan, only: list[str]) -> list[Mistake]:
+    """Return the mistakes that a code on the command line answers, all without one."""
+    starts = tuple(only) or ("",)
+    return [m for m in plan.mistake if any(code.startswith(starts) for code in m.codes)]
+
+
+def variants(plan: Plan, names: list[str]) -> Iterator[tuple[str, str]]:
+    """Yield (recording, place): an empty place is the one where it was made."""
+    for source in plan.recording:
+        if source.name.startswith(tuple(names) or ""):
+            yield from ((source.name, place) for place in (("",) * source.here + source.places))
+
+
+def show_mistake(mistake: Mistake, outcomes: list[Outcome], *, everything: bool) -> None:
+    """Print how one mistake fared, and where it was missed or wrongly found."""
+    words = counted(outcomes)
+    rows = sum(outcome.rows for outcome in outcomes if outcome.word == "found")
+    hits = sum(min(outcome.hits, outcome.rows) for outcome in outcomes if outcome.word == "found")
+    share = f"{hits / rows:6.0%}" if rows else "     -"
+    counts = "".join(f"{words[word]:>9}" for word in ("found", "missed", "silent", "wrong"))
+    print(f"{'/'.join(code[3:] for code in mistake.codes):16}{mistake.name:58.57}{counts}{share}")
+    for outcome in outcomes:
+        if everything or outcome.word in ("missed", "wrong"):
+            print(f"    {outcome.word}: {outcome.variant}, {outcome.hits}/{outcome.rows} rows")
+            if outcome.text:
+                print(f"      {outcome.text}")
+
+
+def show(plan: Plan, mistakes: list[Mistake], verdicts: Verdicts, *, everything: bool) -> bool:
+    """Print the table and the totals; return whether all is as it must be."""
+    outcomes: dict[str, list[Outcome]] = defaultdict(list)
+    for outcome in verdicts.outcomes:
+        outcomes[outcome.mistake].append(outcome)
+    print(f"{'codes':16}{'mistake':58}    found   missed   silent    wrong  rows")
+    for mistake in sorted(mistakes, key=lambda m: m.codes):
+        show_mistake(mistake, outcomes[mistake.name], everything=everything)
+    totals = counted(verdicts.outcomes)
+    decided = totals["found"] + totals["missed"]
+    print(
+        f"\n{len(verdicts.outcomes)} cases: {decided} decided, {totals['found']} found, recall "
+        f"{recall(totals):.2%}; {totals['silent']} silent where nothing decides, {totals['wrong']} not"
+    )
+    for alarm in verdicts.alarms:
+        print(f"ALARM {alarm}")
+    print(f"{len(verdicts.alarms)} alarms on {verdicts.originals} originals")
+    show_gaps(plan, mistakes, outcomes)
+    each = [recall(counted(some)) for some in outcomes.values()]
+    return min(each, default=1.0) >= REQUIRED_RECALL and not verdicts.alarms and not totals["wrong"]
+
+
+def counted(outcomes: list[Outcome]) -> Counter[str]:
+    """Return how many outcomes have each word."""
+    words: Counter[str] = Counter()
+    words.update(outcome.word for outcome in outcomes)
+    return words
+
+
+def recall(words: Counter[str]) -> float:
+    """Return the share found of what can be decided, 1 where nothing can."""
+    decided = words["found"] + words["missed"]
+    return words["found"] / decided if decided else 1.0
+
+
+def show_gaps(plan: Plan, mistakes: list[Mistake], outcomes: dict[str, list[Outcome]]) -> None:
+    """Print what was not measured: rules to come, rules without a mistake, mistakes without a case."""
+    built = {rule.code for rule, _ in known_rules()}
+    answered = {code for mistake in plan.mistake for code in mistake.codes}
+    bare = {c for c in built - answered if c.startswith(FAMILIES)} - set(plan.unmeasured)
+    print(f"No rule yet: {' '.join(sorted(answered - built)) or 'none'}")
+    print(f"Rules without a mistake here: {' '.join(sorted(bare)) or 'none'}")
+    empty = [m.name for m in mistakes if not outcomes[m.name] and set(m.codes) & built]
+    print(f"Mistakes without a case: {'; '.join(empty) or 'none'}")
+
+
+def main() -> int:
+    """Run every mistake on every variant; 1 when a recall is short, or where there should be silence."""
+    asked = options()
+    folder: Path = asked.corpus / "sitl"
+    if is_absent(folder):
+        return 0
+    plan = read_plan()
+    mistakes = chosen(plan, asked.only)
+    codes = tuple(asked.only) or FAMILIES
+    jobs = list(variants(plan, asked.recording))
+    verdicts = Verdicts()
+    with ProcessPoolExecutor(asked.jobs) as pool:
+        for one in pool.map(judge_variant, repeat(folder), jobs, repeat(mistakes), repeat(codes)):
+            verdicts.add(one)
+    return int(not show(plan, mistakes, verdicts, everything=asked.all))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
