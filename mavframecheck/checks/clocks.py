@@ -15,13 +15,12 @@ from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.enums import Clock
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.clocks import MAX_EVENTS, Seen, StepBack, Still
-from mavframecheck.vehicle.timing import Clocks, Pool, Step, Timing, wraps
+from mavframecheck.vehicle.timing import STEP_S, Clocks, Pool, Step, Timing, wraps
 from mavframecheck.wire import Batch
 
 Floats = npt.NDArray[np.float64]
 
 _EXCHANGES = ("TIMESYNC", "PING")
-
 _LATE = 128
 """From here on a sequence counter went back rather than forward."""
 
@@ -31,7 +30,8 @@ class ClockCheck(Check):
 
     timed = False
     """Whether nothing can be said without receive times."""
-    unstamped = "the recording has no receive times that can be believed"
+    undecided = ""
+    """Why it cannot say anything where it has no stream to judge."""
 
     def __init__(self, *args: object) -> None:
         """Know nothing yet."""
@@ -61,8 +61,8 @@ class ClockCheck(Check):
         """Return the stamped rows of the streams looked at."""
         rows = sum(timing.stream.stamped for timing in self.judged())
         if self.timed and self.clocks.timings and not self.clocks.received:
-            return Verdict(0, self.unstamped)
-        return Verdict(rows)
+            return Verdict(0, "the recording has no receive times that can be believed")
+        return Verdict(rows, self.undecided if self.clocks.timings and not rows else "")
 
     def autopilot(self, sender: int) -> bool:
         """Return whether a sender is an autopilot."""
@@ -101,6 +101,7 @@ class BackwardStamps(ClockCheck):
             timing
             for timing in self.clocks.timings
             if timing.sender not in self.clocks.disordered
+            and not timing.copied
             and timing.stream.key.message not in _EXCHANGES
         ]
 
@@ -332,8 +333,8 @@ def _clusters(steps: list[tuple[Timing, Step]]) -> list[list[tuple[Timing, Step]
     for timing, step in sorted(steps, key=lambda pair: pair[1].before):
         for cluster in clusters[-4:]:
             other = cluster[0][1]
-            alike = abs(step.offset_s - other.offset_s) <= 1.0 + 0.1 * abs(other.offset_s)
-            if alike and step.before <= other.seen.number and other.before <= step.seen.number:
+            same = abs(step.offset_s - other.offset_s) <= STEP_S + 0.1 * abs(other.offset_s)
+            if same and step.before <= other.seen.number and other.before <= step.seen.number:
                 cluster.append((timing, step))
                 break
         else:
@@ -369,6 +370,6 @@ class SharedSystemId(ClockCheck):
             return 0.0
         steps = np.array([_back_s(timing, each) for each in timing.stream.backs[:MAX_EVENTS]])
         usual = float(np.median(steps))
-        alike = np.abs(steps - usual) <= 0.1 * usual
+        same = np.mean(np.abs(steps - usual) <= 0.1 * usual) >= self.params["min_share"]
         far = usual >= self.params["min_apart_s"]
-        return usual if far and alike.mean() >= self.params["min_share"] else 0.0
+        return usual if far and same and not timing.copied else 0.0

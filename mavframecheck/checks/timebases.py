@@ -37,13 +37,14 @@ class StampUnits(ClockCheck):
     """Stamps that run a power of 1000 too fast or too slow."""
 
     timed = True
+    undecided = "no stream of stamps is long enough to tell its rate"
 
     def judged(self) -> Sequence[Timing]:
         """Return the streams that are long enough."""
         return [
             timing
             for timing in self.clocks.timings
-            if timing.stream.key.message != "TIMESYNC"
+            if not _has_own_rule(timing)
             and timing.rate is not None
             and timing.span_s >= self.params["min_span_s"]
         ]
@@ -89,6 +90,12 @@ class StampUnits(ClockCheck):
         if pool is not None:
             yield pool.rate, self.params["own_factor"]
         yield 1.0, self.params["receive_factor"]
+
+
+def _has_own_rule(timing: Timing) -> bool:
+    """Return whether another rule looks at the unit."""
+    message, clock = timing.stream.key.message, timing.stream.field.clock
+    return message == "TIMESYNC" or (message == "SYSTEM_TIME" and clock == Clock.UNIX)
 
 
 class WallClocks(ClockCheck):
@@ -208,6 +215,7 @@ class GrowingLatency(ClockCheck):
     """Streams that fall behind the clock of their sender."""
 
     timed = True
+    undecided = "no stream runs long enough beside other streams of one clock"
 
     def judged(self) -> Sequence[Timing]:
         """Return the streams that have a clock to be compared with."""
@@ -275,6 +283,8 @@ def _drift(timing: Timing) -> float:
 
 class TimesyncMisuse(StampUnits):
     """TIMESYNC with another unit than nanoseconds."""
+
+    undecided = ""
 
     def judged(self) -> Sequence[Timing]:
         """Return the exchanges that last long enough."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mavframecheck.cli.clocks import ClockTable
 from mavframecheck.cli.options import dialect_option, input_kind_option
 from mavframecheck.cli.output import echo, page_context
 from mavframecheck.cli.positions import FORMATS, Positions, Wish, position_options
@@ -16,6 +17,7 @@ from mavframecheck.report.escape import sentence
 
 if TYPE_CHECKING:
     from mavframecheck.engine import Settings
+    from mavframecheck.model.origins import FileOrigins
     from mavframecheck.model.survey import FileSurvey
 
 _PIPE_WIDTH = 100
@@ -44,6 +46,16 @@ _PIPE_WIDTH = 100
     is_flag=True,
     help="Show every field, not only those about place, attitude, time and frames.",
 )
+@click.option(
+    "--origins",
+    is_flag=True,
+    help="Show where local frames begin, where home is and where vehicles were armed.",
+)
+@click.option(
+    "--clocks",
+    is_flag=True,
+    help="Show whose clock each stamp is, and how it runs: offset, rate, latency, steps.",
+)
 @position_options
 @dialect_option
 @input_kind_option
@@ -55,6 +67,8 @@ def inspect(
     form: str | None,
     messages: tuple[str, ...],
     every_field: bool,
+    origins: bool,
+    clocks: bool,
     dialect: str,
     input_kind: str | None,
     wish: Wish | None,
@@ -63,19 +77,22 @@ def inspect(
 
     LOG is a file, a directory, or - for standard input. Per sender and message: rate, and for each
     field its unit, frame, direction, height reference, clock, range and how much of it is missing.
-    With --positions: every position as a record instead.
+    With --positions: every position as a record instead. With --origins: where positions count from. With --clocks: the clock behind each stamp.
 
     Exit codes: 0 done, 2 wrong usage or a file that cannot be read, 3 nothing could be decoded.
     """
     from mavframecheck.engine import Settings
 
     settings = Settings(dialect=dialect, input_kind=input_kind)
+    if (wish is not None) + origins + clocks > 1:
+        raise click.UsageError("choose one of --positions, --origins and --clocks")
     if wish is not None:
         exporter = Positions(settings, _known(messages, dialect), wish)
         ctx.exit(exporter.show(paths, form or "csv"))
     if form in FORMATS:
         raise click.UsageError(f"--format {form} goes with --positions")
-    view = VIEWS["map"](settings, messages)
+    chosen = "origins" if origins else "clocks" if clocks else "map"
+    view = VIEWS[chosen](settings, messages)
     context = page_context()
     if not context.terminal:
         context = context._replace(width=_PIPE_WIDTH)
@@ -111,7 +128,40 @@ class _Map:
         return survey, survey.messages
 
 
-VIEWS = {"map": _Map}
+class _Origins:
+    """Where local positions and heights above home count from."""
+
+    def __init__(self, settings: Settings, messages: tuple[str, ...]) -> None:
+        if messages:
+            raise click.UsageError("--message does not go with --origins")
+        self._settings = settings
+
+    def show(
+        self, paths: tuple[str, ...], form: str, context: Context, *, every_field: bool
+    ) -> int:
+        """Write the registry of each file; return the exit code."""
+        from mavframecheck.cli.files import Files
+        from mavframecheck.report.origins import render_json, render_text
+
+        if every_field:
+            raise click.UsageError("--all does not go with --origins")
+        files = Files(paths, self._read)
+        render = render_json if form == "json" else render_text
+        echo(render(files.results(), context))
+        return files.exit_code()
+
+    def _read(self, path: str, advance: Callable[[int], None] | None) -> tuple[FileOrigins, int]:
+        from mavframecheck.engine.origins import origins_of_file
+
+        found = origins_of_file(path, self._settings, advance)
+        return found, found.messages
+
+
+VIEWS: dict[str, type[_Map | _Origins | ClockTable]] = {
+    "map": _Map,
+    "origins": _Origins,
+    "clocks": ClockTable,
+}
 """What `inspect` can show of a recording, by name."""
 
 

@@ -1,7 +1,8 @@
 """Rules over rows: loading, expressions, running, episodes, verdicts."""
 
 from mavframecheck.engine.check import check_file, check_recording
-from mavframecheck.engine.compiled import Pack, RuleFileError
+from mavframecheck.engine.compiled import Pack
+from mavframecheck.engine.expression import RuleFileError
 from mavframecheck.engine.pack import load_pack
 from mavframecheck.engine.settings import Settings, SettingsError
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from mavframecheck.engine.expression import ANY_NAME, Expression, ExpressionError
+from mavframecheck.engine.expression import ANY_NAME, Expression, ExpressionError, RuleFileError
 from mavframecheck.engine.template import Template
 from mavframecheck.model import Rule, Severity
 from mavframecheck.semantics import catalogue
@@ -24,10 +24,6 @@ OWN_NAMES = frozenset({"message", "field", "unit"})
 """Names that every rule knows: the message and the field that it is looking at, and the field's unit."""
 ALWAYS_KNOWN = frozenset({"sender.role"})
 """Context that never has to be waited for."""
-
-
-class RuleFileError(Exception):
-    """A rule file that cannot be used; the text names file, key and column."""
 
 
 class CompiledRule:
@@ -152,12 +148,21 @@ class CompiledRule:
     @functools.cached_property
     def awaited(self) -> frozenset[str]:
         """Context worth waiting for: what judging, severity and words speak of."""
+        return frozenset(name for name in self._spoken_of if NAMES[name].waits)
+
+    @functools.cached_property
+    def asked_at_once(self) -> frozenset[str]:
+        """Context that is not worth waiting for: as it is known when a row comes, however long that waits."""
+        return self._spoken_of - self.awaited
+
+    @functools.cached_property
+    def _spoken_of(self) -> frozenset[str]:
         spoken = [condition for condition, _ in self.severities]
         for template in (self.text, self.fix, *self.evidence.values()):
             spoken += template.expressions
         parts = [p for e in (self.when, self.flag, self.worst, *spoken) for p in self._with_lets(e)]
         named = self.required.union(*(part.contexts | part.hoped | part.tested for part in parts))
-        return frozenset(name for name in named - ALWAYS_KNOWN if NAMES[name].waits)
+        return frozenset(named - ALWAYS_KNOWN)
 
     def _contexts(self, expression: Expression | None) -> set[str]:
         return set().union(*(each.contexts for each in self._with_lets(expression)))
@@ -171,17 +176,22 @@ class CompiledRule:
 
     def _expression(self, code: str, names: frozenset[str], key: str) -> Expression:
         try:
-            return Expression(code, names)
+            expression = Expression(code, names)
         except ExpressionError as error:
             message = f"{self._source}: {key}, column {error.column}: {error}"
             raise RuleFileError(message) from error
+        expression.where = f"{self._source}: {key}"
+        return expression
 
     def _template(self, text: str, key: str) -> Template:
         try:
-            return Template(text, self._text_names)
+            template = Template(text, self._text_names)
         except ExpressionError as error:
             message = f"{self._source}: {key}, column {error.column}: {error}"
             raise RuleFileError(message) from error
+        for expression in template.expressions:
+            expression.where = f"{self._source}: {key}"
+        return template
 
 
 @dataclass(frozen=True, slots=True)

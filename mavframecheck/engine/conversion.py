@@ -28,6 +28,7 @@ Representation: TypeAlias = Literal["geodetic", "ecef", "ned", "enu", "utm"]
 
 _AXES: dict[str, EarthAxes] = {"ned": "NED", "enu": "ENU"}
 _NO_HEIGHT = "no height, which this representation needs"
+_NO_LEVEL = "nothing says how high the level is that its height is counted from"
 
 
 @dataclass(frozen=True)
@@ -102,30 +103,34 @@ class Converter:
         if wanted is None or not isinstance(position, GeodeticPosition):
             return extract
         try:
-            return replace(extract, position=position.above(wanted, extract.level_msl_m))
+            raised = position.above(wanted, extract.level_msl_m)
         except MixingError as error:
-            blank = replace(
-                position, height_m=np.full(len(position), np.nan), height_reference=wanted
-            )
+            unknown = np.full(len(position), np.nan)
+            blank = replace(position, height_m=unknown, height_reference=wanted)
             return _refused(extract, str(error), blank)
+        found = np.isfinite(raised.height_m) | ~np.isfinite(position.height_m)
+        return _replaced(extract, raised, found, _NO_LEVEL)
 
     def _to_utm(self, extracts: list[Extract]) -> list[Extract]:
         self._zone = self._zone or _first_zone(extracts)
-        return [self._in_zone(each) for each in extracts]
+        return [part for each in extracts for part in self._in_zone(each) if len(part)]
 
-    def _in_zone(self, extract: Extract) -> Extract:
-        """Return the extract on the map of the zone; what lies in another one is refused."""
+    def _in_zone(self, extract: Extract) -> Iterator[Extract]:
+        """Yield what lies in the zone, on its map, and what does not, without a position."""
         position = extract.position
-        if not isinstance(position, GeodeticPosition) or self._zone is None:
-            return replace(extract, position=None)
-        number, north = self._zone
-        flat = position.to_utm(number, north=north)
+        if not isinstance(position, GeodeticPosition):
+            yield extract
+            return
         zones = utm.zone(position.lat_deg, position.lon_deg)
-        inside = (zones == number) & ((position.lat_deg >= 0) == north)
-        xyz = np.where(inside[:, None], flat.xyz, np.nan)
-        words = f"not in UTM zone {flat.zone}{flat.hemisphere}: two zones do not mix"
-        moved = replace(flat, xyz=xyz)
-        return _replaced(extract, moved, inside, words)
+        good, on_a_map = extract.problem == "", zones > 0
+        if self._zone is not None:
+            number, north = self._zone
+            inside = good & (zones == number) & ((position.lat_deg >= 0) == north)
+            flat = position.take(inside).to_utm(number, north=north)
+            yield replace(extract.take(inside), position=flat)
+            words = f"not in UTM zone {flat.zone}{flat.hemisphere}: two zones do not mix"
+            yield _refused(extract.take(good & on_a_map & ~inside), words)
+        yield _refused(extract.take(~good | ~on_a_map), "UTM reaches from 80 S to 84 N")
 
 
 def _point(position: Position | None) -> GeodeticPosition | LocalPosition:

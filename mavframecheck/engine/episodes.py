@@ -82,7 +82,7 @@ class Episode:
         persist: Persist = self.rule.rule.detect.persist
         seconds = 0.0
         if self.first.t_us is not None and self.last.t_us is not None:
-            seconds = (self.last.t_us - self.first.t_us) * 1e-6
+            seconds = (self.last.t_us - self.first.t_us) / 1e6
         return (
             self.count >= persist.count
             and seconds >= persist.seconds

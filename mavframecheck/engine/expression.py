@@ -8,6 +8,7 @@ else is an error that names the column of the text.
 from __future__ import annotations
 
 import ast
+import inspect
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
@@ -27,7 +28,11 @@ ANY_NAME = "*"
 """Among the names of an expression: any name is allowed (a Python check gives the values)."""
 
 
-class ExpressionError(Exception):
+class RuleFileError(Exception):
+    """A rule file that cannot be used; the text names file, key and column."""
+
+
+class ExpressionError(RuleFileError):
     """A text that is no expression of ours; `column` counts from 1."""
 
     def __init__(self, text: str, column: int) -> None:
@@ -91,6 +96,8 @@ class Expression:
     def __init__(self, source: str, names: frozenset[str]) -> None:
         """Compile `source`; `names` are the parameters and named expressions it may use."""
         self.source = source
+        self.where = ""
+        """File and key that it stands in."""
         self.contexts: set[str] = set()
         """Context columns it reads."""
         self.tested: set[str] = set()
@@ -103,8 +110,12 @@ class Expression:
 
     def __call__(self, scope: Scope) -> Any:
         """Evaluate on the rows of `scope`: a column, or a scalar when it depends on no row."""
-        with np.errstate(all="ignore"):
-            return self._evaluate(scope)
+        try:
+            with np.errstate(all="ignore"):
+                return self._evaluate(scope)
+        except (TypeError, ValueError, IndexError, OverflowError) as error:
+            text = f"{self.where}: {self.source!r} cannot be computed ({error})"
+            raise RuleFileError(text) from error
 
     def _compile(self, node: ast.expr) -> Evaluate:
         compiler = _COMPILERS.get(type(node))
@@ -241,6 +252,10 @@ class Expression:
                 f"unknown function {name!r}: one of {', '.join(sorted({*FUNCTIONS, *FIELD_FUNCTIONS}))}",
             )
         function, arguments = FUNCTIONS[name], [self._compile(argument) for argument in node.args]
+        fewest, most = _arity(function)
+        if not fewest <= len(arguments) <= most:
+            number = f"{fewest}" if fewest == most else f"{fewest} to {most}"
+            raise _error(node, f"{name}() takes {number} values, not {len(arguments)}")
         return lambda scope: function(*(argument(scope) for argument in arguments))
 
     def _field_call(self, function: str, node: ast.Call) -> Evaluate:
@@ -340,6 +355,16 @@ def _depth(tree: ast.AST) -> int:
         deepest += 1
         level = [child for node in level for child in ast.iter_child_nodes(node)]
     return deepest
+
+
+def _arity(function: Callable[..., Any]) -> tuple[int, int]:
+    """Return how many values a function takes; numpy's would take one more for an array to write to."""
+    if isinstance(function, np.ufunc):
+        return function.nin, function.nin
+    parameters = inspect.signature(function).parameters.values()
+    if any(p.kind is p.VAR_POSITIONAL for p in parameters):
+        return 2, MAX_LENGTH
+    return sum(p.default is p.empty for p in parameters), len(parameters)
 
 
 def _link(operator: Callable[..., Any], left: Evaluate, right: Evaluate) -> Evaluate:

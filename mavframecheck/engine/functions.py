@@ -129,6 +129,11 @@ def called(family: Any) -> Any:
     return np.array(names).reshape(np.shape(family))
 
 
+def rounded(value: Any, digits: int = 0) -> Any:
+    """Return numbers rounded to `digits` decimals, halves to the even one."""
+    return np.round(value, int(digits))
+
+
 def fixed(value: Any, digits: int) -> Any:
     """Return numbers as texts with `digits` decimals, for texts of findings."""
     flat = [f"{number:.{int(digits)}f}" for number in np.ravel(value).tolist()]
@@ -143,7 +148,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "hypot": np.hypot,
     "arctan2": np.arctan2,
     "wrap_pi": wrap_pi,
-    "round": np.round,
+    "round": rounded,
     "sin": np.sin,
     "cos": np.cos,
     "degrees": np.degrees,

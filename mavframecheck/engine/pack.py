@@ -10,7 +10,8 @@ from pathlib import Path
 import msgspec
 
 from mavframecheck.checks import load_check
-from mavframecheck.engine.compiled import CompiledRule, Pack, RuleFileError, bound_messages
+from mavframecheck.engine.compiled import CompiledRule, Pack, bound_messages
+from mavframecheck.engine.expression import RuleFileError
 from mavframecheck.engine.settings import Settings
 from mavframecheck.model import Rule
 

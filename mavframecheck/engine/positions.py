@@ -313,8 +313,9 @@ class _Cells:
         source, table = self.rows.source, self.rows.table
         names = ("origin.id", "origin.lat", "origin.lon", "origin.alt_msl")
         known = [source.lookup(name, table, late=False) for name in names]
-        columns = np.stack([np.where(each.known, each.values, np.inf) for each in known], axis=1)
-        found, which = np.unique(columns, axis=0, return_inverse=True)
+        columns = [np.where(each.known, each.values, np.inf) for each in known]
+        said = np.stack([np.where(known[1].known, self.rows.about, -1), *columns], axis=1)
+        found, which = np.unique(said, axis=0, return_inverse=True)
         return [_origin(*row) for row in found.tolist()], which.reshape(-1)
 
     def _problems(self) -> Ints:
@@ -469,12 +470,12 @@ def _beside(rows: Bools, column: Floats) -> Bools:
     return rows[:, None] if column.ndim > 1 else rows
 
 
-def _origin(number: float, lat: float, lon: float, alt_msl: float) -> Origin | None:
-    """Return an origin by what the registry says, None where none is in force."""
-    if not np.isfinite([lat, lon, alt_msl]).all():
+def _origin(system: float, number: float, lat: float, lon: float, alt: float) -> Origin | None:
+    """Return an origin by what the registry says, to the mm; None where none is in force."""
+    if not np.isfinite([lat, lon, alt]).all():
         return None
-    name = str(int(number)) if np.isfinite(number) else None
-    return Origin(name, lat, lon, alt_msl, AltRef.MSL)
+    name = f"{int(system)}:{int(number)}" if np.isfinite(number) else None
+    return Origin(name, round(lat, 9), round(lon, 9), round(alt, 3), AltRef.MSL)
 
 
 _FRAMES: dict[Frame, tuple[str, bool, bool]] = {

@@ -36,6 +36,8 @@ class _Desk:
 
     queue: Queue
     rules: list[tuple[CompiledRule, str | None, list[Binding]]]
+    at_once: set[str] = field(default_factory=set)
+    """Context that the rows take along as it is known when they come."""
 
 
 class _Hall:
@@ -66,6 +68,7 @@ class _Hall:
                 labelled.setdefault(binding.label, []).append(binding)
             names = tuple(sorted(rule.awaited))
             desk = desks.setdefault(names, _Desk(Queue(names), []))
+            desk.at_once |= rule.asked_at_once
             desk.rules += [(rule, label, bindings) for label, bindings in labelled.items()]
         self.desks = list(desks.values())
 
@@ -111,9 +114,9 @@ class Runner:
             self._judge_ready(desk, desk.queue.close())
         runs = [self._run_of(rule) for rule in self._rules]
         for rule, check in self._checks:
-            runs.append(_verdict_of(rule, check))
             for observation in check.finish():
                 self._episodes.observe(_episode(rule, observation))
+            runs.append(_verdict_of(rule, check))
         return self._episodes.findings(), sorted(runs, key=lambda run: run.code)
 
     def _halls_for(self, message: str) -> list[_Hall]:
@@ -130,6 +133,9 @@ class Runner:
 
     def _serve(self, desk: _Desk, rows: Rows | None, batch: Batch) -> None:
         if desk.queue.names:
+            if rows is not None:
+                for name in desk.at_once:
+                    rows.context(name)
             rows = desk.queue.offer(rows, batch.frames)
         self._judge_ready(desk, rows)
 

@@ -8,8 +8,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mavframecheck.engine import governed, stacks
-from mavframecheck.engine.compiled import Binding, RuleFileError
-from mavframecheck.engine.expression import Expression
+from mavframecheck.engine.compiled import Binding
+from mavframecheck.engine.expression import Expression, RuleFileError
 from mavframecheck.semantics.acceptance import Verdict
 from mavframecheck.semantics.tags import FieldTag
 from mavframecheck.vehicle.rows import Rows

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mavframecheck.engine.expression import Expression, ExpressionError, Scope
+from mavframecheck.engine.expression import Expression, ExpressionError, RuleFileError, Scope
 from mavframecheck.model import Scalar
 
 
@@ -35,7 +35,7 @@ class Template:
     def fill(self, scope: Scope) -> str:
         """Return the text for the first row of `scope`."""
         return "".join(
-            literal + ("" if code is None else format_value(first_value(code(scope)), spec))
+            literal + ("" if code is None else _filled(code, spec, scope))
             for literal, code, spec in self._pieces
         )
 
@@ -45,6 +45,16 @@ class Template:
             code = self._pieces[0][1]
             return plain(first_value(code(scope))) if code is not None else ""
         return self.fill(scope)
+
+
+def _filled(code: Expression, spec: str, scope: Scope) -> str:
+    """Return one piece in braces in words."""
+    value = first_value(code(scope))
+    try:
+        return format_value(value, spec)
+    except (ValueError, TypeError) as error:
+        text = f"{code.where}: {value!r} cannot be written as {spec!r} ({error})"
+        raise RuleFileError(text) from error
 
 
 def first_value(column: Any) -> Any:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple, TypeAlias
@@ -41,6 +42,8 @@ class Column(NamedTuple):
     def plain(self) -> list[Any]:
         """Return Python values, None where nothing is known."""
         values: list[Any] = self.values.tolist()
+        if self.values.ndim > 1:
+            values = [[None if math.isnan(each) else each for each in row] for row in values]
         if self.known.all():
             return values
         return [v if k else None for v, k in zip(values, self.known.tolist(), strict=True)]
@@ -80,8 +83,14 @@ def _reference(extract: Extract) -> Any:
     return str(reference) if reference else None
 
 
-def _time(name: str) -> Read:
+def _said(name: str) -> Read:
+    """Return a reader of what is said beside the numbers."""
     return lambda e: getattr(e.measured, name)
+
+
+def _accuracy(name: str) -> Read:
+    metres = _said(name)
+    return lambda e: None if metres(e) is None else np.round(metres(e), _METRES)
 
 
 def _origin_id(extract: Extract) -> Any:
@@ -103,7 +112,11 @@ def _covariance(extract: Extract) -> Any:
 
 
 def _covariance_frame(extract: Extract) -> Any:
-    return extract.measured.covariance_frame if _covariance(extract) is not None else None
+    matrices = _covariance(extract)
+    if matrices is None:
+        return None
+    known = np.isfinite(matrices).any(axis=1).tolist()
+    return [extract.measured.covariance_frame if each else None for each in known]
 
 
 _CARTESIAN = (EcefPosition, LocalPosition, BodyVector)
@@ -116,10 +129,10 @@ def _axes(extract: Extract) -> Any:
 
 
 FIELDS: tuple[Field, ...] = (
-    Field("time_utc_ns", "int", _time("utc_ns")),
-    Field("timestamp_ns", "int", _time("time_ns")),
+    Field("time_utc_ns", "int", _said("utc_ns")),
+    Field("timestamp_ns", "int", _said("time_ns")),
     Field("clock", "text", lambda e: str(e.measured.clock) or None),
-    Field("received_utc_ns", "int", _time("received_ns")),
+    Field("received_utc_ns", "int", _said("received_ns")),
     Field("source", "text", lambda e: e.measured.source),
     Field("sysid", "int", lambda e: e.sysid),
     Field("compid", "int", lambda e: e.compid),
@@ -146,8 +159,8 @@ FIELDS: tuple[Field, ...] = (
     Field("point_of_reference", "text", lambda e: str(e.measured.point) or None),
     Field("covariance_frame", "text", _covariance_frame),
     Field("covariance_m2", "floats", _covariance),
-    Field("horizontal_accuracy_m", "float", lambda e: e.measured.horizontal_accuracy_m),
-    Field("vertical_accuracy_m", "float", lambda e: e.measured.vertical_accuracy_m),
+    Field("horizontal_accuracy_m", "float", _accuracy("horizontal_accuracy_m")),
+    Field("vertical_accuracy_m", "float", _accuracy("vertical_accuracy_m")),
     Field("valid", "bool", lambda e: e.problem == ""),
     Field("problem", "text", lambda e: [text or None for text in e.problem]),
     Field("offset", "int", lambda e: e.offset),
@@ -234,7 +247,7 @@ class Csv(Writer):
     def _cells(self, name: str, column: Column) -> list[Any]:
         plain = column.plain()
         if name == "covariance_m2":
-            return [row and " ".join(map(str, row)) for row in plain]
+            return [row and " ".join("nan" if v is None else str(v) for v in row) for row in plain]
         if name == "valid":
             return ["true" if each else "false" for each in plain]
         return plain

@@ -8,8 +8,9 @@ so nothing depends on where batches are cut, and memory does not grow. `timing` 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ import numpy.typing as npt
 
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.enums import Clock, Quantity
+from mavframecheck.vehicle.timesync import Exchanges
 from mavframecheck.wire import Batch, Frames, Layout, Table
 
 MAX_STREAMS = 512
@@ -171,11 +173,12 @@ class StampStream:
     first: Seen | None = None
     last: Seen | None = None
     """First and last stamped row."""
-    backs: list[StepBack] = field(default_factory=list)
-    epochs: list[StepBack] = field(default_factory=list)
+    first_stamp: int = 0
+    backs: list[StepBack] = dataclasses.field(default_factory=list)
+    epochs: list[StepBack] = dataclasses.field(default_factory=list)
     """Neighbours of which one counts from a boot and the other from 1970."""
-    stills: list[Still] = field(default_factory=list)
-    knots: Knots = field(default_factory=lambda: np.zeros(0, KNOT))
+    stills: list[Still] = dataclasses.field(default_factory=list)
+    knots: Knots = dataclasses.field(default_factory=lambda: np.zeros(0, KNOT))
     level: int = 0
     _before: _Last | None = None
     _run: _Run | None = None
@@ -206,12 +209,12 @@ class StampStream:
         if not len(stamps):
             return
         self._compare(table, stamps)
-        self._knot(table.frames, stamps)
-        self.coarsen(level)
+        self._knot(table.frames, stamps, level)
         payload = self._payloads(table, slice(-1, None))[0]
         counter = int(table.frames.seq[-1])
         self._before = _Last(seen(table.frames, -1), int(stamps[-1]), counter, payload)
-        self.first = self.first or seen(table.frames, 0)
+        if self.first is None:
+            self.first, self.first_stamp = seen(table.frames, 0), int(stamps[0])
         self.last = self._before.seen
 
     def _compare(self, table: Table, stamps: Ints) -> None:
@@ -307,16 +310,22 @@ class StampStream:
         columns[self.field.name] = 0
         return columns.view(np.uint8).reshape(len(columns), -1)
 
-    def _knot(self, frames: Frames, stamps: Ints) -> None:
+    def _knot(self, frames: Frames, stamps: Ints, level: int) -> None:
         """Add rows with a believable receive time to the knots."""
+        self.coarsen(level)
         rows = np.flatnonzero(frames.t_valid)
-        new = np.empty(len(rows), KNOT)
-        new["stretch"] = frames.number[rows] >> self.level
-        new["rows"] = 1
-        new["number"] = new["last_number"] = frames.number[rows]
-        new["t_us"] = new["last_t_us"] = new["low_t_us"] = frames.t_us[rows]
-        new["stamp"] = new["last_stamp"] = new["low_stamp"] = stamps[rows]
-        new["offset"], new["size"] = frames.offset[rows], frames.size[rows]
+        if not len(rows):
+            return
+        number, t_us, stamps = frames.number[rows], frames.t_us[rows], stamps[rows]
+        starts, ends, stretch = _stretches(number >> level)
+        low = _lowest(t_us - stamps * self.field.unit_us, starts, ends)
+        new = np.empty(len(starts), KNOT)
+        new["stretch"], new["rows"] = stretch, ends - starts + 1
+        new["number"], new["last_number"] = number[starts], number[ends]
+        new["t_us"], new["last_t_us"], new["low_t_us"] = t_us[starts], t_us[ends], t_us[low]
+        new["stamp"], new["last_stamp"] = stamps[starts], stamps[ends]
+        new["low_stamp"] = stamps[low]
+        new["offset"], new["size"] = frames.offset[rows[starts]], frames.size[rows[starts]]
         self.knots = self._joined(np.concatenate((self.knots, new)))
 
     def coarsen(self, level: int) -> None:
@@ -327,12 +336,11 @@ class StampStream:
 
     def _joined(self, knots: Knots) -> Knots:
         """Return one knot for those of one stretch, which follow each other."""
-        starts = np.flatnonzero(np.diff(knots["stretch"], prepend=-1))
-        if len(starts) == len(knots):
+        if (np.diff(knots["stretch"]) > 0).all():
             return knots
-        ends = np.append(starts[1:], len(knots)) - 1
+        starts, ends, _ = _stretches(knots["stretch"])
         lag = knots["low_t_us"] - knots["low_stamp"] * self.field.unit_us
-        low = np.lexsort((lag, knots["stretch"]))[starts]
+        low = _lowest(lag, starts, ends)
         joined = knots[starts]
         joined["rows"] = np.add.reduceat(knots["rows"], starts)
         for name in ("last_number", "last_t_us", "last_stamp"):
@@ -340,6 +348,19 @@ class StampStream:
         for name in ("low_t_us", "low_stamp"):
             joined[name] = knots[name][low]
         return joined
+
+
+def _stretches(stretch: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return first and last place of each run of equal numbers (n,), and the numbers."""
+    starts = np.flatnonzero(np.diff(stretch, prepend=-1))
+    return starts, np.append(starts[1:], len(stretch)) - 1, stretch[starts]
+
+
+def _lowest(lag: npt.NDArray[np.float64], starts: Ints, ends: Ints) -> Ints:
+    """Return the place of the first least value in each run."""
+    least = np.repeat(np.minimum.reduceat(lag, starts), ends - starts + 1)
+    places = np.flatnonzero(lag == least)
+    return np.asarray(places[np.searchsorted(places, starts)])
 
 
 class ClockBook:
@@ -351,6 +372,7 @@ class ClockBook:
         self.refused = 0
         """Rows of streams beyond `MAX_STREAMS`."""
         self.level = 0
+        self.exchanges = Exchanges()
         self._fields: dict[str, tuple[StampField, ...]] = {}
 
     def update(self, batch: Batch) -> None:
@@ -359,6 +381,8 @@ class ClockBook:
             return
         while int(batch.frames.number[-1]) >> self.level >= MAX_KNOTS:
             self.level += 1
+        if "TIMESYNC" in batch.tables:
+            self.exchanges.update(batch.tables["TIMESYNC"])
         heard = [each for name in batch.tables for each in self._heard(batch.tables, name)]
         for key, stamp, table in sorted(heard, key=lambda each: _first(each[2])):
             stream = self.streams.get(key)
@@ -403,8 +427,8 @@ def _first(table: Table) -> int:
 def _as_int64(column: npt.NDArray[Any]) -> Ints:
     """Return stamps as signed numbers; what does not fit is the largest one."""
     if column.dtype == np.uint64:
-        return np.minimum(column, np.uint64(2**63 - 1)).astype(np.int64)
-    return column.astype(np.int64)
+        column = np.minimum(column, np.uint64(2**63 - 1))
+    return np.asarray(column, np.int64)
 
 
 def _parts(table: Table) -> Iterator[tuple[int, Table]]:

@@ -171,12 +171,20 @@ class Context:
         kept = self._ready(history)
         if entry.after:
             return kept.after(asked, entry.max_age_us or 0)
-        before = kept.before(asked, entry.max_age_us)
+        before = self._of_its_boot(history, asked, kept.before(asked, entry.max_age_us))
         alone = not (late and entry.waits) or (self._assumed is not None and history == "identity")
         if alone or before.found.all():
             return before
-        after = kept.after(asked)
+        after = self._of_its_boot(history, asked, kept.after(asked))
         return Answer(*(np.where(before.found, b, a) for b, a in zip(before, after, strict=True)))
+
+    def _of_its_boot(self, history: str, asked: Asked, answer: Answer) -> Answer:
+        """Drop what the registry says of another boot of the vehicle than the one a row was sent in."""
+        if history not in REGISTERED:
+            return answer
+        boot = self._histories[history].values("boot", answer)
+        same = boot == self.registry.boots(asked.key, asked.since)
+        return answer._replace(found=answer.found & same)
 
     def _ready(self, name: str) -> History:
         """Return a history with all that the current batch says."""

@@ -211,10 +211,10 @@ SOURCES: tuple[Source, ...] = (
 """What autopilots say; a source of HEARTBEAT comes before those that need to know who is one."""
 
 REGISTERED = {
-    "origin": ("id", "lat", "lon", "alt_msl"),
-    "launch": ("lat", "lon", "alt_msl"),
+    "origin": ("id", "boot", "lat", "lon", "alt_msl"),
+    "launch": ("boot", "lat", "lon", "alt_msl"),
 }
-"""Histories that the registry of origins feeds, and their quantities."""
+"""Histories that the registry of origins feeds, and their quantities; what they say holds in its boot only."""
 
 _POSITION = "no GLOBAL_POSITION_INT with a position"
 _ORIGIN = "no GPS_GLOBAL_ORIGIN, and no local and global positions together"
@@ -304,6 +304,7 @@ NAMES: dict[str, Name] = {
     **{
         f"launch.{quantity}": Name((("launch", quantity),), meaning, _LAUNCH, waits=False)
         for quantity, meaning in {
+            "boot": "restarts before the vehicle was armed last; unknown until it is armed in this boot",
             "lat": "latitude where the vehicle was armed last, deg",
             "lon": "longitude where it was armed last, deg",
             "alt_msl": "height where it was armed last, above mean sea level, m",

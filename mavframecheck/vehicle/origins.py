@@ -7,7 +7,7 @@ in force when it was made. What is established in one boot of a vehicle does not
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -133,7 +133,8 @@ class Launch(NamedTuple):
     system: int
     component: int
     boot: int
-    at: Geodetic
+    at: Geodetic | None
+    """None: not known, or armed before the recording began."""
     seen: Seen
 
 
@@ -174,7 +175,7 @@ class Registry:
         self.lost: list[tuple[int, Seen]] = []
         """System and frame of each restart: no origin holds until the next one is established."""
         self._vehicles: dict[int, _Vehicle] = {}
-        self._news: dict[str, int] = {"origins": 0, "lost": 0, "launches": 0}
+        self._news: dict[str, int] = {"origins": 0, "launches": 0}
 
     def update(self, batch: Batch, tables: Mapping[str, Table]) -> None:
         """Take in a batch, and of it what autopilots say in `tables`."""
@@ -188,6 +189,12 @@ class Registry:
             own = {name: table.take(table.frames.sysid == system) for name, table in tables.items()}
             asked = [event for event in requests if event.what.target in (0, system)]
             vehicle.update(batch.frames, {n: t for n, t in own.items() if len(t)}, asked)
+
+    @property
+    def systems(self) -> list[int]:
+        """The vehicles of which an origin, a home or a launch point is known."""
+        entered: list[Sequence[Origin | Home | Launch]] = [self.origins, self.homes, self.launches]
+        return sorted({each.system for entries in entered for each in entries})
 
     def in_force(self, system: int) -> Origin | None:
         """Return the origin that holds for a vehicle at the end of the batch."""
@@ -206,16 +213,24 @@ class Registry:
         place = np.searchsorted([since for since, _ in order], number, side="left") - 1
         return np.array([k for _, k in order])[place]
 
+    def boots(self, system: Ints, number: Ints) -> Ints:
+        """Return (n,) how often each system had been started anew when each frame came."""
+        boots = np.zeros(len(system), np.int64)
+        for lost in sorted({lost for lost, _ in self.lost}):
+            since = sorted(seen.number for each, seen in self.lost if each == lost)
+            boots = np.where(system == lost, np.searchsorted(since, number, side="left"), boots)
+        return boots
+
     def news(self, subject: str) -> Iterator[tuple[int, Seen, dict[str, float]]]:
         """Yield system, frame and quantities of each ``origin`` or ``launch`` that the batch establishes."""
         if subject == "launch":
             for launch in self.launches[self._news["launches"] :]:
-                yield launch.system, launch.seen, launch.at._asdict()
-            return
-        for system, seen in self.lost[self._news["lost"] :]:
-            yield system, seen, {}
-        for origin in self.origins[self._news["origins"] :]:
-            yield origin.system, origin.seen, {"id": origin.origin_id, **origin.at._asdict()}
+                place = {} if launch.at is None else launch.at._asdict()
+                yield launch.system, launch.seen, {"boot": launch.boot, **place}
+        else:
+            for origin in self.origins[self._news["origins"] :]:
+                values = {"id": origin.origin_id, "boot": origin.boot, **origin.at._asdict()}
+                yield origin.system, origin.seen, values
 
 
 class _Vehicle:
@@ -262,6 +277,8 @@ class _Vehicle:
         for message, kind in ((SAID, "origin"), ("HOME_POSITION", "home")):
             if message in own:
                 events += self._changes(own[message], kind, restarts)
+            elif restarts:
+                self._said.pop(kind, None)
         pairs = self._pairing.update(own.get("LOCAL_POSITION_NED"), own.get("GLOBAL_POSITION_INT"))
         done = 0
         for event in sorted(events, key=lambda each: each.seen.number):
@@ -295,7 +312,7 @@ class _Vehicle:
     def _changes(self, table: Table, kind: str, restarts: list[_Event]) -> Iterator[_Event]:
         """Yield where a message says another position than before in this boot."""
         at = np.column_stack(
-            (table["latitude"] * 1e-7, table["longitude"] * 1e-7, table["altitude"] * 1e-3)
+            (table["latitude"] / 1e7, table["longitude"] / 1e7, table["altitude"] / 1e3)
         )
         placed = np.flatnonzero((at[:, 0] != 0) | (at[:, 1] != 0))
         number = table.frames.number[placed]
@@ -308,13 +325,18 @@ class _Vehicle:
     def _changed(self, table: Table, at: Floats, rows: Ints, kind: str) -> Iterator[_Event]:
         while len(rows):
             last = self._said.get(kind)
-            if last is not None:
-                rows = rows[np.flatnonzero(_away(at[rows], last) > STEP_M)]
-            if len(rows):
-                said = self._said[kind] = Geodetic(*at[rows[0]].tolist())
-                stamp = int(table["time_usec"][rows[0]])
-                boot_ms = stamp // 1000 if 0 < stamp < UNIX_US else None
-                yield _Event(_seen(table.frames, int(rows[0])), kind, said, boot_ms)
+            far = (
+                np.arange(len(rows))
+                if last is None
+                else np.flatnonzero(_away(at[rows], last) > STEP_M)
+            )
+            if not len(far) or not self._room(f"{kind} said"):
+                return
+            row, rows = int(rows[far[0]]), rows[far[0] + 1 :]
+            said = self._said[kind] = Geodetic(*at[row].tolist())
+            stamp = int(table["time_usec"][row])
+            boot_ms = stamp // 1000 if 0 < stamp < UNIX_US else None
+            yield _Event(_seen(table.frames, row), kind, said, boot_ms)
 
     def _armings(self, beats: Table | None, globe: Table | None) -> Iterator[_Event]:
         """Yield where the vehicle is armed and disarmed, with the last position before."""
@@ -352,7 +374,7 @@ class _Vehicle:
     def _on_arming(self, event: _Event) -> None:
         armed, clock_us, place = event.what
         self._armed_us = clock_us if armed else None
-        if armed and place is not None and self._room("launches"):
+        if armed and self._room("launches"):
             launch = Launch(*self._who, place, event.seen)
             self._registry.launches.append(launch)
 
@@ -396,7 +418,7 @@ class _Vehicle:
     def _infer(self, pairs: Rows) -> None:
         """Bring the origin forward by pairs of positions: those that disagree with it for long replace it."""
         rows, known = np.concatenate((self._open, self._in_this_boot(pairs))), len(self._open)
-        while len(rows) > known:
+        while len(rows) > known and self._kept["origins"] < MAX_ENTRIES:
             off = self._disagree(rows)
             joined = np.concatenate(([False], _agree(rows[:-1], rows[1:]) & off[:-1]))
             joined[1:known] = True
@@ -544,7 +566,7 @@ def _last_place(globe: Table | None, number: int, before: Geodetic | None) -> Ge
     if not len(placed):
         return before
     row = int(placed[-1])
-    return Geodetic(float(lat[row] * 1e-7), float(lon[row] * 1e-7), float(globe["alt"][row] * 1e-3))
+    return Geodetic(float(lat[row] / 1e7), float(lon[row] / 1e7), float(globe["alt"][row] / 1e3))
 
 
 def _seen(frames: Frames, row: int) -> Seen:
@@ -580,15 +602,15 @@ def _asked_for(table: Table, row: int) -> Geodetic | None:
     """Return the position that a request names, None for the current one."""
     scales = {"SET_GPS_GLOBAL_ORIGIN": _INTS, "SET_HOME_POSITION": _INTS}
     names = scales.get(table.name) or _PARAMS[table.name]
-    lat, lon, alt = (float(table[name][row]) * scale for name, scale in names)
+    lat, lon, alt = (float(table[name][row]) / scale for name, scale in names)
     given = np.isfinite([lat, lon, alt]).all() and abs(lat) <= 90 and (lat, lon) != (0, 0)
     current = table.name in _PARAMS and table["param1"][row] == 1
     return Geodetic(lat, lon, alt) if given and not current else None
 
 
-_INTS = (("latitude", 1e-7), ("longitude", 1e-7), ("altitude", 1e-3))
+_INTS = (("latitude", 1e7), ("longitude", 1e7), ("altitude", 1e3))
 _PARAMS = {
-    "COMMAND_INT": (("x", 1e-7), ("y", 1e-7), ("z", 1.0)),
+    "COMMAND_INT": (("x", 1e7), ("y", 1e7), ("z", 1.0)),
     "COMMAND_LONG": (("param5", 1.0), ("param6", 1.0), ("param7", 1.0)),
 }
 _SET_HOME = (constant("MAV_CMD.DO_SET_HOME"),)

@@ -123,9 +123,9 @@ def _global_rows(table: Table | None) -> Rows:
         return np.zeros(0, _GLOBAL)
     rows = _seen(table, _GLOBAL)
     rows["lat"], rows["lon"], rows["alt"] = (
-        table["lat"] * 1e-7,
-        table["lon"] * 1e-7,
-        table["alt"] * 1e-3,
+        table["lat"] / 1e7,
+        table["lon"] / 1e7,
+        table["alt"] / 1e3,
     )
     placed: Rows = rows[(rows["lat"] != 0) | (rows["lon"] != 0)]
     return placed

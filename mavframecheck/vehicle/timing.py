@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,6 @@ import numpy.typing as npt
 from mavframecheck.semantics.enums import Clock
 from mavframecheck.vehicle.clocks import (
     MAX_KNOTS,
-    UNIX_S,
     ClockBook,
     Seen,
     StampStream,
@@ -42,6 +41,10 @@ SAME_CLOCK_S = 1.0
 """Clocks whose offsets differ by less (s) count as one."""
 _ALIKE = 2.0
 """Streams of one clock have rates within this factor; another unit is 1000 times off."""
+_COPIED_SHARE = 0.1
+"""Of the rows of a stream with copies, so many have an earlier stamp than the one before."""
+_AROUND, _AROUND_FRAMES = 4, 100
+"""The offset of a clock is the least lag within so many stretches, and frames, on either side."""
 _ROUND = 16
 """Rates are medians over this part of the recording: a few steps do not matter."""
 
@@ -101,6 +104,23 @@ class Timing:
         return rate if rate > 0 else None
 
     @functools.cached_property
+    def copied(self) -> bool:
+        """Return whether a slow second link brings messages again, some seconds later.
+
+        Its copies begin with stamps that were there before, and take turns with the others.
+        """
+        stream = self.stream
+        if stream.back < _COPIED_SHARE * stream.stamped or not stream.backs or stream.first is None:
+            return False
+        step = stream.backs[0]
+        if step.stamp_after < stream.first_stamp:
+            return False
+        if stream.first.t_us is None or step.before.t_us is None:
+            return True
+        elapsed_s = (step.before.t_us - stream.first.t_us) * 1e-6 * (self.rate or 1.0)
+        return self.seconds(step.stamp_before - stream.first_stamp) < 2 * elapsed_s + STEP_S
+
+    @functools.cached_property
     def span_s(self) -> float:
         """Receive time between the earliest and the latest knot, s."""
         t = self.stream.knots["low_t_us"]
@@ -151,6 +171,34 @@ class Timing:
         t = knots[f"{prefix}t_us"] * 1e-6
         return np.asarray(t - knots[f"{prefix}stamp"] * (self.unit_s / rate))
 
+    @property
+    def offset_s(self) -> float:
+        """Receive time minus stamp at the start, the least of the first knots, s."""
+        knots = self.stream.knots[:_ROUND]
+        return float(np.min(knots["low_t_us"] * 1e-6 - knots["low_stamp"] * self.unit_s))
+
+    def latency(self, pool: Pool | None) -> tuple[float, float] | None:
+        """Return median and 99th percentile of latency, s: beside `pool`, else its own least lag.
+
+        Rows are the first of each knot, so that every part of the recording counts alike.
+        """
+        if self.rate is None:
+            return None
+        clock = _pool([self]) if pool is None else pool
+        if clock is None:
+            return None
+        quiet = ~np.isin(self.stream.knots["stretch"], self._unsteady())
+        late = self.lag("first", clock.rate) - clock.least()[self.stream.knots["stretch"]]
+        late = late[quiet & np.isfinite(late)]
+        if not len(late):
+            return None
+        return float(np.median(late)), float(np.quantile(late, 0.99))
+
+    def _unsteady(self) -> Ints:
+        """Return stretches in which the clock steps, and those around them."""
+        steps = np.array([step.seen.number >> self.stream.level for step in self.steps], np.int64)
+        return (steps[:, None] + np.arange(-_AROUND, _AROUND + 1)).reshape(-1)
+
     def seconds(self, stamp: int) -> float:
         """Return a stamp in seconds."""
         return stamp * self.unit_s
@@ -164,6 +212,8 @@ class Pool:
     low: Floats
     """(MAX_KNOTS,) least lag in each stretch, s; inf where nothing was heard."""
     streams: int
+    around: int
+    """Stretches on either side that are looked at for the least lag."""
 
     def at(self, stretch: Ints) -> Floats:
         """Return the lag of the clock in some stretches, NaN far from where it was heard."""
@@ -172,10 +222,20 @@ class Pool:
             return np.full(len(stretch), np.nan)
         return np.interp(stretch, heard, self.low[heard], np.nan, np.nan)
 
+    def least(self) -> Floats:
+        """Return (MAX_KNOTS,) the least lag around each stretch, s: the offset of the clock there."""
+        far = np.full(self.around, np.inf)
+        padded = np.concatenate((far, self.low, far))
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * self.around + 1)
+        return np.asarray(windows.min(axis=1))
+
     @property
     def offset_s(self) -> float:
         """Receive time minus stamp where the clock was first heard, s."""
         return float(self.low[np.isfinite(self.low)][0])
+
+
+Groups: TypeAlias = list[tuple[list[tuple[Timing, StepBack]], bool]]
 
 
 class Clocks:
@@ -190,6 +250,7 @@ class Clocks:
         for timing in self.timings:
             self.of.setdefault(timing.sender, []).append(timing)
         self._pools: dict[tuple[int, int | None], Pool | None] = {}
+        self._grouped: dict[int, Groups] = {}
 
     @property
     def received(self) -> bool:
@@ -207,10 +268,18 @@ class Clocks:
         """Return the boot clock of a sender from all its streams, or all but one."""
         if sender is None:
             return None
+        if len(self.of.get(sender, ())) > _MANY:
+            without = None
         key = (sender, None if without is None else id(without))
         if key not in self._pools:
             self._pools[key] = _pool(self._running(sender, without))
         return self._pools[key]
+
+    def shared(self, timing: Timing) -> Pool | None:
+        """Return the clock of the sender if the stream goes by it."""
+        if timing not in self._running(timing.sender, None):
+            return None
+        return self.pool(timing.sender)
 
     def _running(self, sender: int, without: Timing | None) -> list[Timing]:
         """Return the streams of a sender that show one running boot clock."""
@@ -225,6 +294,46 @@ class Clocks:
             and each.rate is not None
             and usual / _ALIKE < each.rate < usual * _ALIKE
         ]
+
+    def domain(self, timing: Timing) -> str:
+        """Return what the stamps of a stream count: ``boot``, ``unix``, ``vehicle``, ``sender``...
+
+        ``vehicle`` is the boot clock of the autopilot it is addressed to or sits beside; ``constant`` is
+        no clock; ``mixed`` counts from both a boot and 1970.
+        """
+        stream = timing.stream
+        if not stream.moves:
+            return "constant"
+        if 0 < stream.since_unix < stream.stamped:
+            return "mixed"
+        if stream.since_unix:
+            return "unix"
+        if self.role(timing.sender) == "autopilot" or timing.rate is None:
+            return "boot"
+        pool = self.pool(self.autopilot_of(timing))
+        if pool is None:
+            return "sender"
+        apart = timing.lag("low", pool.rate) - pool.at(stream.knots["stretch"])
+        known = np.abs(apart[np.isfinite(apart)])
+        return "vehicle" if len(known) and np.median(known) <= SAME_CLOCK_S else "sender"
+
+    def boot_utc(self, sender: int) -> float | None:
+        """Return when a sender was started, s since 1970, by its last SYSTEM_TIME; None without one."""
+        said = {
+            each.stream.field.name: each
+            for each in self.of.get(sender, ())
+            if each.stream.key.message == "SYSTEM_TIME"
+        }
+        if set(said) < {"time_boot_ms", "time_unix_usec"}:
+            return None
+        boot, unix = said["time_boot_ms"], said["time_unix_usec"]
+        _, at_boot, at_unix = np.intersect1d(
+            boot.stream.knots["last_number"], unix.stream.knots["last_number"], return_indices=True
+        )
+        if not len(at_boot) or not unix.unix:
+            return None
+        since = boot.stream.knots["last_stamp"][at_boot[-1]] * boot.unit_s
+        return float(unix.stream.knots["last_stamp"][at_unix[-1]] * unix.unit_s - since)
 
     @functools.cached_property
     def restarts(self) -> list[Restart]:
@@ -289,8 +398,13 @@ class Clocks:
         pool = self.pool(sender)
         return 1.0 if pool is None else pool.rate
 
-    def _groups(self, sender: int) -> list[tuple[list[tuple[Timing, StepBack]], bool]]:
+    def _groups(self, sender: int) -> Groups:
         """Return backward steps of a component that may be one, and whether other streams deny it."""
+        if sender not in self._grouped:
+            self._grouped[sender] = self._group(sender)
+        return self._grouped[sender]
+
+    def _group(self, sender: int) -> Groups:
         backs = [
             (timing, each)
             for timing in self.of[sender]
@@ -329,6 +443,8 @@ class Clocks:
 
 _NEAR_WRAP = 0.02
 """Within this share of its range from the end, then from the start, a counter may have started over."""
+_MANY = 64
+"""Among so many streams one more or less does not change their clock."""
 _ALONE = 2
 """So many streams of a sender may step back by a mistake of their own."""
 _FEW_FRAMES = 20
@@ -372,7 +488,8 @@ def _pool(timings: list[Timing]) -> Pool | None:
     low = np.full(MAX_KNOTS, np.inf)
     for each in timings:
         np.minimum.at(low, each.stream.knots["stretch"], each.lag("low", rate))
-    return Pool(rate, low, len(timings))
+    around = max(_AROUND, _AROUND_FRAMES >> timings[0].stream.level)
+    return Pool(rate, low, len(timings), around)
 
 
 def _seconds(values: Ints, unit_s: float) -> Floats:
@@ -383,6 +500,3 @@ def _seconds(values: Ints, unit_s: float) -> Floats:
 def _woven(first: Ints, second: Ints) -> Ints:
     """Return the elements of two columns by turns."""
     return np.stack((first, second), axis=1).reshape(-1)
-
-
-__all__ = ["SAME_CLOCK_S", "UNIX_S", "Clocks", "Pool", "Restart", "Step", "Timing", "wraps"]

@@ -10,9 +10,13 @@ import numpy as np
 from mavframecheck.model import Damage
 from mavframecheck.wire.chunk import Chunk
 from mavframecheck.wire.dialect import Dialect
-from mavframecheck.wire.frames import Bools, Frames, join
+from mavframecheck.wire.frames import STX_V1, STX_V2, Bools, Frames, join
 from mavframecheck.wire.framing import Framer, Scan
 from mavframecheck.wire.table import Tables
+
+MANY_MAGIC = 300_000
+SHORT = 1 << 18
+"""Bytes of a chunk that is read in parts because it holds more magic bytes than that."""
 
 
 class Batch:
@@ -62,6 +66,23 @@ def _merge(scans: list[Scan]) -> tuple[bytes, Frames]:
     )
 
 
+def _bounded(chunks: Iterable[list[Chunk]]) -> Iterator[list[Chunk]]:
+    """Cut a chunk that holds magic bytes by the hundred thousand: each is looked at as a frame."""
+    for group in chunks:
+        plain = len(group) == 1 and len(group[0].starts) == 1
+        if not plain or _magic_bytes(group[0].data) <= MANY_MAGIC:
+            yield group
+            continue
+        (chunk,) = group
+        for at in range(0, len(chunk.data), SHORT):
+            part = chunk.data[at : at + SHORT]
+            yield [chunk._replace(data=part, offsets=chunk.offsets + at)]
+
+
+def _magic_bytes(data: bytes) -> int:
+    return data.count(STX_V1) + data.count(STX_V2)
+
+
 def read_batches(
     chunks: Iterable[list[Chunk]], dialect: Dialect, *, stamped: bool
 ) -> Iterator[Batch]:
@@ -71,7 +92,7 @@ def read_batches(
     """
     framers: dict[int, Framer] = {}
     first = clock_us = 0
-    for group in chunks:
+    for group in _bounded(chunks):
         scans = []
         for chunk in group:
             framer = framers.setdefault(chunk.flow, Framer(dialect, stamped=stamped))

@@ -42,6 +42,8 @@ from mavframecheck.wire.stamps import Stamps
 PADDING = bytes(LONGEST_FRAME)
 """Zeros behind a buffer, so that a header or payload window may reach over its end."""
 
+CHECKED_AT_ONCE = 1 << 17
+"""Checksums computed together: a buffer of magic bytes asks for millions."""
 NO_RECORD, STOP = -1, -2
 CUT_OFF = "the frame is cut off"
 """Why the end of a recording that was not closed holds no frame."""
@@ -239,8 +241,11 @@ class _Walk:
         """Compute the checksums of the candidates at `rows` that were not computed yet."""
         c = self.candidates
         rows = rows[~c.checked[rows]]
-        if not len(rows):
-            return
+        for first in range(0, len(rows), CHECKED_AT_ONCE):
+            self._check_some(rows[first : first + CHECKED_AT_ONCE])
+
+    def _check_some(self, rows: Ints) -> None:
+        c = self.candidates
         start = c.start[rows]
         covered = c.length[rows] + c.header[rows] - 1
         crc = crc16_of_ranges(self.octets, start + 1, covered, c.seeds[rows].astype(np.uint8))

@@ -37,7 +37,10 @@ def frames(t_us: list[int]) -> Frames:
 
 
 def judged(
-    part: Frames, hit: list[bool], stream: list[int] | None = None, badness: list[float] | None = None
+    part: Frames,
+    hit: list[bool],
+    stream: list[int] | None = None,
+    badness: list[float] | None = None,
 ) -> Judged:
     """Return rows as the runner hands them over; the words name the frame."""
     streams = np.array(stream or [1] * len(hit), np.int64)
@@ -58,7 +61,7 @@ def findings(
     cuts: list[int] | None = None,
     stream: list[int] | None = None,
     badness: list[float] | None = None,
-    **persist: float,
+    persist: dict[str, float] | None = None,
 ) -> list[Finding]:
     """Collect hits, in one batch or cut, and return the findings."""
     times = t_us or [START_US + k * SECOND // 10 for k in range(len(hit))]
@@ -143,7 +146,7 @@ def test_how_much_makes_a_finding(
     persist: dict[str, float], hit: list[bool], expected: list[int]
 ) -> None:
     """Hits, receive time between the first and the last, hits per judged row between them: all given hold."""
-    assert counts(findings(hit, **persist)) == expected
+    assert counts(findings(hit, persist=persist)) == expected
 
 
 def test_no_more_than_fifty_episodes() -> None:
@@ -165,7 +168,9 @@ def test_no_more_streams_than_the_bound() -> None:
     assert len(found) == MAX_STREAMS
 
 
-def naive(hit: list[bool], t_us: list[int], persist: dict[str, float]) -> list[tuple[int, int, int]]:
+def naive(
+    hit: list[bool], t_us: list[int], persist: dict[str, float]
+) -> list[tuple[int, int, int]]:
     """Return first row, last row and count of each episode, by one plain loop."""
     open_: list[int] = []
     done: list[list[int]] = []
@@ -181,7 +186,7 @@ def naive(hit: list[bool], t_us: list[int], persist: dict[str, float]) -> list[t
         done.append(open_)
     kept = []
     for rows in done:
-        seconds = (t_us[rows[-1]] - t_us[rows[0]]) * 1e-6
+        seconds = (t_us[rows[-1]] - t_us[rows[0]]) / 1e6
         judged_rows = rows[-1] - rows[0] + 1
         if (
             len(rows) >= persist.get("count", 1)
@@ -207,11 +212,9 @@ def test_against_a_plain_loop(
     """The same episodes for any hits, any times and any cut into batches."""
     hit = [is_hit for is_hit, _ in rows]
     t_us = list(itertools.accumulate((step for _, step in rows), initial=START_US))[1:]
-    found = findings(hit, t_us, cuts=cuts, **persist) if hit else []
+    found = findings(hit, t_us, cuts=cuts, persist=persist) if hit else []
     expected = naive(hit, t_us, persist)
-    marks = [
-        (t_us[first] * 1e-6, t_us[last] * 1e-6, count) for first, last, count in expected
-    ]
+    marks = [(t_us[first] * 1e-6, t_us[last] * 1e-6, count) for first, last, count in expected]
     assert [(f.time_first, f.time_last, f.count) for f in found] == marks
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavframecheck.wire import Table
 from mavframecheck.wire.crc import crc16, crc16_of_ranges
@@ -23,7 +24,6 @@ from tests.strategies import (
     blank,
     frame,
     link,
-    mavlink,
     packed,
     read,
     record,
@@ -194,9 +194,7 @@ class TestPresent:
             frame("GPS_RAW_INT", {"alt_ellipsoid": value}, seq=k, version=version)
             for k, (value, version) in enumerate(rows)
         )
-        tables = [
-            b.tables["GPS_RAW_INT"] for b in read([stream], stamped=False).batches if len(b)
-        ]
+        tables = [b.tables["GPS_RAW_INT"] for b in read([stream], stamped=False).batches if len(b)]
         present = [p for table in tables for p in table.present("alt_ellipsoid").tolist()]
         assert present == [version == 2 and value > 0 for value, version in rows]
 
@@ -240,9 +238,7 @@ class TestCrc:
         ranges=st.lists(st.tuples(st.integers(0, 599), st.integers(0, 264)), max_size=20),
         seeds=st.lists(st.integers(0, 255), min_size=20, max_size=20),
     )
-    def test_of_ranges(
-        self, data: bytes, ranges: list[tuple[int, int]], seeds: list[int]
-    ) -> None:
+    def test_of_ranges(self, data: bytes, ranges: list[tuple[int, int]], seeds: list[int]) -> None:
         """Anywhere in a buffer, its very beginning included."""
         padded = np.frombuffer(data + bytes(8), np.uint8)
         places = [(a % len(data), n) for a, n in ranges]
@@ -292,9 +288,7 @@ class TestEncode:
         fields = {name: data.draw(values(*shape(kind, name))) for name in kind.fieldnames}
         layout = DIALECT.layouts[kind.id]
         if version == 1:
-            fields |= {
-                f.name: zero(f.type, f.length) for f in layout.fields if f.extension
-            }
+            fields |= {f.name: zero(f.type, f.length) for f in layout.fields if f.extension}
         payload = encode_payload(layout, fields)
         ours = encode_frame(layout, payload, sysid=3, compid=4, seq=300, version=version)
         theirs = packed(kind, fields, (3, 4), 300, version)

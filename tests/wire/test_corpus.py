@@ -16,11 +16,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavframecheck.sources import Kind, open_recording
 from mavframecheck.wire import Batch, Layout, read_batches
 from tests.sources.made import CORPUS, NO_CORPUS
-from tests.strategies import DIALECT, MESSAGES, STAMP, mavlink
+from tests.strategies import DIALECT, MESSAGES, STAMP
 
 FULL = os.environ.get("MAVFRAMECHECK_FULL_CORPUS") == "1"
 EVERY = 1 if FULL else 3

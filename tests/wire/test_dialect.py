@@ -58,7 +58,9 @@ def test_layouts_are_those_of_pymavlink(name: str) -> None:
         assert set(dialect.layouts) == set(module.mavlink_map)
 
 
-@pytest.mark.parametrize("file", sorted(pymavlink_definitions().glob("*.xml")), ids=lambda f: f.stem)
+@pytest.mark.parametrize(
+    "file", sorted(pymavlink_definitions().glob("*.xml")), ids=lambda f: f.stem
+)
 def test_every_dialect_of_the_release_can_be_read(file: Path) -> None:
     """Its messages have types that numpy takes: some hold already what our supplement adds to others."""
     for layout in load_dialect(file.stem).layouts.values():
@@ -91,7 +93,9 @@ def generate(xml: Path, folder: Path, name: str) -> ModuleType:
     return module
 
 
-@pytest.mark.skipif(not UPSTREAM.is_dir(), reason="the XML of mavlink/mavlink is not beside the checkout")
+@pytest.mark.skipif(
+    not UPSTREAM.is_dir(), reason="the XML of mavlink/mavlink is not beside the checkout"
+)
 def test_the_supplement_is_what_upstream_defines(tmp_path: Path) -> None:
     """Every message we add, or lengthen, as pymavlink's own generator reads the newer definition."""
     newer = generate(UPSTREAM / "common.xml", tmp_path, "newer_common").mavlink_map
@@ -177,37 +181,26 @@ def test_a_dialect_that_does_not_exist(name: str, words: str) -> None:
         load_dialect(name)
 
 
+def message(*fields: str, head: str = 'id="5" name="M"') -> str:
+    """Return a dialect of one message."""
+    inside = "".join(f"<field {field}/>" for field in fields)
+    return f"<mavlink><messages><message {head}>{inside}</message></messages></mavlink>"
+
+
 @pytest.mark.parametrize(
     ("xml", "words"),
     [
         ("<mavlink", r"bad\.xml: cannot read the dialect"),
         ("<mavlink><include>gone.xml</include></mavlink>", r"gone\.xml: cannot read the dialect"),
-        ('<mavlink><messages><message id="5"/></messages></mavlink>', "needs a name and a number"),
-        ('<mavlink><messages><message id="x" name="M"/></messages></mavlink>', "a number of 24 bits as id"),
-        (
-            '<mavlink><messages><message id="5" name="M"><field type="complex" name="z"/></message>'
-            "</messages></mavlink>",
-            r"bad\.xml: M: field 'z' has the unknown type 'complex'",
-        ),
-        (
-            '<mavlink><messages><message id="5" name="M"><field type="float[x]" name="z"/></message>'
-            "</messages></mavlink>",
-            "'z'",
-        ),
-        (
-            '<mavlink><messages><message id="5" name="M">'
-            '<field type="float" name="z"/><field type="float" name="z"/></message>'
-            "</messages></mavlink>",
-            "'z'",
-        ),
-        (
-            '<mavlink><messages><message id="5" name="M"><field type="float[70]" name="z"/></message>'
-            "</messages></mavlink>",
-            "its fields take 280 bytes",
-        ),
-        ('<mavlink><messages><message id="-5" name="M"/></messages></mavlink>', "number"),
-        ('<mavlink><messages><message id="99999999" name="M"/></messages></mavlink>', "number"),
-        ('<mavlink><messages><message id="5" name="M"/></messages></mavlink>', "no field"),
+        (message(head='id="5"'), "needs a name and a number"),
+        (message(head='id="x" name="M"'), "a number of 24 bits as id"),
+        (message(head='id="-5" name="M"'), "a number of 24 bits as id"),
+        (message(head='id="99999999" name="M"'), "a number of 24 bits as id"),
+        (message('type="complex" name="z"'), r"bad\.xml: M: field 'z' has the unknown type 'comp"),
+        (message('type="float[x]" name="z"'), "field 'z' has the array length 'x'"),
+        (message('type="float[70]" name="z"'), "its fields take 280 bytes"),
+        (message(*['type="float" name="z"'] * 2), "it has the field 'z' twice"),
+        (message(), "it has no field"),
     ],
 )
 def test_a_definition_that_cannot_be_used(tmp_path: Path, xml: str, words: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 
 import numpy as np
@@ -225,7 +226,9 @@ class TestWhatIsRead:
     def test_a_stamp_or_more_is_missing(self, stamped: bool) -> None:
         """A good frame without its stamp is a good frame without a time."""
         records = in_order(4, stamped=stamped)
-        frames = read([b"".join((*records[:2], attitude(90), *records[2:]))], stamped=stamped).frames
+        frames = read(
+            [b"".join((*records[:2], attitude(90), *records[2:]))], stamped=stamped
+        ).frames
         assert frames.seq.tolist() == [0, 1, 90, 2, 3]
         assert not frames.t_valid[2]
 
@@ -277,7 +280,9 @@ class TestWhatIsRead:
     def test_unknown_id_before_garbage_is_stepped_over(self, stamped: bool) -> None:
         """Without a checksum only what follows can confirm a frame; a good one inside it is kept."""
         hidden = record(attitude(5), stamped=stamped)
-        false = record(b"\xfd\xff\x00\x00\x01\x01" + UNKNOWN_ID.to_bytes(3, "little"), stamped=stamped)
+        false = record(
+            b"\xfd\xff\x00\x00\x01\x01" + UNKNOWN_ID.to_bytes(3, "little"), stamped=stamped
+        )
         stream = false + b"x" * 40 + hidden + b"y" * 300 + record(attitude(6), stamped=stamped)
         frames = read([stream], stamped=stamped).frames
         assert frames.known.all()
@@ -348,13 +353,11 @@ class TestPieces:
         whole_chunk = self.chunk(pieces, 0, 7)
         places = sorted({0, len(pieces), *(c % (len(pieces) + 1) for c in cuts)})
         groups = []
-        for a, b in zip(places, places[1:]):
+        for a, b in itertools.pairwise(places):
             data = b"".join(pieces[a:b])
             starts = whole_chunk.starts[a:b] - whole_chunk.starts[a]
             assert whole_chunk.t_us is not None
-            groups.append(
-                [Chunk(data, starts, whole_chunk.offsets[a:b], whole_chunk.t_us[a:b])]
-            )
+            groups.append([Chunk(data, starts, whole_chunk.offsets[a:b], whole_chunk.t_us[a:b])])
         at_once = read_chunks([[whole_chunk]], stamped=False)
         in_groups = read_chunks(groups, stamped=False)
         assert described(in_groups.frames) == described(at_once.frames)

@@ -40,6 +40,8 @@ FITS = 0.36
 """An axis that is off by less than this, rad (20 degrees), points where it should."""
 MISFITS = 0.5
 """One that is off by more than this, rad (29 degrees), does not."""
+CLEARLY = 0.4
+"""The axes that fit leave less than this share of what those of the label leave."""
 MIN_LENGTH = 0.2
 """A direction in which the stream moves less than this share of the reference says nothing."""
 
@@ -80,7 +82,10 @@ class Fit(NamedTuple):
     delay_known: bool
     track_m: float
     """How far the vehicle went while it was compared."""
+    step_m: float
+    """Usual displacement of the vehicle over `span_s`, m."""
     span_s: float
+    """Over how long displacements were taken, s."""
     name: str
     """The axes in one word: ``ENU``."""
     times: tuple[float, float]
@@ -228,6 +233,7 @@ def _conclude(steps: _Steps, frame: Frame, seen: _Directions, scale: float) -> F
         steps.delay_s,
         bool(sharp),
         float(np.linalg.norm(steps.reference, axis=1).mean() * steps.independent),
+        float(np.linalg.norm(steps.reference, axis=1).mean()),
         steps.span_s,
         name,
         (float(steps.at[0]), float(steps.at[-1])),
@@ -256,6 +262,9 @@ def _other(
         return _permuted(steps, frame, fitting, scale)
     if len(fitting):
         best = fitting[int(np.argmin([_left(steps, matrix, scale) for matrix in fitting]))]
+        label = frame.axes @ yaw_matrix(_yaw(steps, frame.axes, scale))
+        if _left(steps, best, scale) > CLEARLY * _left(steps, label, scale):
+            return "undecided", best, "", ""
         return _freely(frame, best)
     turned = [c @ yaw_matrix(_yaw(steps, c, scale)) for c in permutations.CLASSES]
     best = turned[int(np.argmin([_left(steps, matrix, scale) for matrix in turned]))]
@@ -270,10 +279,10 @@ def _other(
 def _permuted(
     steps: _Steps, frame: Frame, fitting: Floats, scale: float
 ) -> tuple[str, Floats, str, str]:
-    lefts = [_left(steps, matrix, scale) for matrix in fitting]
-    likely = _likeliest(fitting, frame.axes)
-    matrix = fitting[likely]
-    del lefts
+    """Return the same for what fits without a turn; several may, where the vehicle moved little."""
+    matrix = fitting[_likeliest(fitting, frame.axes)]
+    if _left(steps, matrix, scale) > CLEARLY * _left(steps, frame.axes, scale):
+        return "undecided", matrix, "", ""
     relative = frame.axes.T @ matrix
     says = permutations.shared_words(fitting)
     name = permutations.words(matrix).name if len(fitting) == 1 else ""

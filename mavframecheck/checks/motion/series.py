@@ -114,13 +114,14 @@ def _resets(place: Floats) -> Bools:
 
 
 def series_of(track: Track) -> Series:
-    """Return the samples of a track; geodetic positions become metres from the first one."""
+    """Return the samples of a track; geodetic positions become metres from the middle one."""
     rows = track.samples()
     rows = rows[np.argsort(rows[:, TIME], kind="stable")]
     place = rows[:, PLACE]
     if track.source.geodetic and len(place):
-        north, east = metres(place[:, 0], place[:, 1], place[:1, 0], place[:1, 1])
-        place = np.column_stack((north, east, place[:1, 2] - place[:, 2]))
+        lat, lon, height = place[np.argsort(place[:, 0])[len(place) // 2]]
+        north, east = metres(place[:, 0], place[:, 1], lat, lon)
+        place = np.column_stack((north, east, height - place[:, 2]))
     attitude = rows[:, ATTITUDE]
     if track.source.euler:
         attitude = quaternions.quaternion_from_euler(*attitude[:, :3].T)

@@ -1,0 +1,189 @@
+"""What is wrong with an attitude, by comparison with another one of the same vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mavframecheck.checks.motion.series import Series
+from mavframecheck.geo import quaternions as q4
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+GRID_S = 0.1
+DELAYS_S: Floats = np.arange(-0.3, 0.81, 0.05)
+TELLING = np.radians(5.0)
+"""Moments at which two readings differ by less than this, rad, do not tell between them."""
+MIN_TELLING = 20
+FITS = np.radians(6.0)
+"""A reading that leaves more than this, rad, is none."""
+CLEARLY = 0.3
+"""It must leave less than this share of what the label leaves."""
+MIN_TURN = np.radians(30.0)
+"""Yaw must change by so much, rad, before an offset is told from a sign."""
+
+
+class Reading(NamedTuple):
+    """How the attitude of a stream may be meant."""
+
+    kind: str
+    says: str
+    of: Callable[[Floats], Floats]
+    """From (n, 4) `ned_from_frd` to what the stream would hold."""
+    free_yaw: bool = False
+
+
+def _euler(change: Callable[[Floats, Floats, Floats], tuple[Floats, Floats, Floats]]) -> Callable[[Floats], Floats]:
+    def of(q: Floats) -> Floats:
+        return q4.quaternion_from_euler(*change(*q4.euler_from_quaternion(q).T))
+
+    return of
+
+
+_FLU: Floats = np.array([0.0, 1, 0, 0])
+"""Half a turn about x: front-left-up from front-right-down, and north-west-up from north-east-down."""
+_ENU: Floats = np.array([0.0, 1, 1, 0]) / np.sqrt(2)
+
+
+def _same(q: Floats) -> Floats:
+    return q
+
+
+READINGS = (
+    Reading("labelled", "", _same),
+    Reading("yaw_offset", "its yaw is off by a constant", _same, free_yaw=True),
+    Reading("yaw_sign", "its yaw counts counter-clockwise", _euler(lambda r, p, y: (r, p, -y))),
+    Reading(
+        "yaw_sign",
+        "its yaw counts counter-clockwise from another direction",
+        _euler(lambda r, p, y: (r, p, -y)),
+        free_yaw=True,
+    ),
+    Reading("order", "its elements are x, y, z, w", lambda q: q[:, [1, 2, 3, 0]]),
+    Reading("inverse", "it is the inverse (from the world to the body)", q4.inverse),
+    Reading(
+        "swapped", "roll and pitch have changed places", _euler(lambda r, p, y: (p, r, y))
+    ),
+    Reading("body", "pitch has the wrong sign", _euler(lambda r, p, y: (r, -p, y))),
+    Reading("body", "roll has the wrong sign", _euler(lambda r, p, y: (-r, p, y))),
+    Reading("body", "pitch and yaw have the wrong sign, as in north-west-up with front-left-up axes", lambda q: q4.product(_FLU, q4.product(q, _FLU))),
+    Reading("body", "it is of east-north-up with front-left-up axes", lambda q: q4.product(_ENU, q4.product(q, _FLU))),
+    Reading("frames", "it is of front-left-up axes", lambda q: q4.product(q, _FLU)),
+    Reading("frames", "it is in east-north-up", lambda q: q4.product(_ENU, q)),
+    Reading("frames", "it is in north-west-up", lambda q: q4.product(_FLU, q)),
+)
+"""In order of simplicity: of two that leave the same, the first one counts."""
+
+
+class Lie(NamedTuple):
+    """How an attitude lies against the reference."""
+
+    kind: str
+    """``labelled`` where nothing is wrong, else the kind of the reading."""
+    says: str
+    left: float
+    """Median difference with that reading, rad, where it matters."""
+    labelled: float
+    """The same as labelled."""
+    yaw: float
+    """Constant turn about the vertical, rad."""
+    seconds: float
+    delay_s: float
+    times: tuple[float, float]
+
+
+def compare(
+    stream: Series,
+    reference: Series,
+    *,
+    free_heading: bool,
+    since_s: float,
+    delay_s: float | None,
+) -> Lie | str:
+    """Say how the attitude of `stream` is to be read, or why that cannot be told."""
+    at = stream.t[stream.t >= since_s]
+    at = at[np.diff(np.floor(at / GRID_S), prepend=-np.inf) > 0]
+    delays = DELAYS_S if delay_s is None else np.array([delay_s])
+    best: tuple[float, float, list[_Read]] | None = None
+    for delay in delays.tolist():
+        mine, theirs = stream.attitudes(at), reference.attitudes(at - delay)
+        both = np.isfinite(mine).all(axis=1) & np.isfinite(theirs).all(axis=1)
+        if np.count_nonzero(both) < 2 * MIN_TELLING:
+            continue
+        reads = [_read(each, mine[both], theirs[both], free_heading=free_heading) for each in READINGS]
+        least = min(read.mean for read in reads)
+        if best is None or least < best[0]:
+            best = least, delay, reads
+    if best is None:
+        return "no attitude of the vehicle at the same time"
+    return _choose(best[2], best[1], (float(at[0]), float(at[-1])))
+
+
+class _Read(NamedTuple):
+    """A stream under one reading."""
+
+    reading: Reading
+    off: Floats
+    """(n,) differences, rad."""
+    predicted: Floats
+    yaw: float
+    turned: float
+    """How far the yaw of the vehicle varies, rad."""
+
+    @property
+    def mean(self) -> float:
+        """Mean of the smallest nine tenths of the differences, rad."""
+        kept = np.sort(self.off)[: max(1, round(0.9 * len(self.off)))]
+        return float(kept.mean())
+
+
+def _read(reading: Reading, mine: Floats, theirs: Floats, *, free_heading: bool) -> _Read:
+    predicted = reading.of(theirs)
+    yaw = 0.0
+    if free_heading or reading.free_yaw:
+        turns = q4.twist(q4.product(mine, q4.inverse(predicted)))
+        yaw = float(np.angle(np.exp(1j * turns).sum()))
+        yaw += float(np.median(np.angle(np.exp(1j * (turns - yaw)))))
+        predicted = q4.product(q4.about_z(yaw), predicted)
+    heading = np.exp(1j * q4.euler_from_quaternion(theirs)[:, 2])
+    spread = np.abs(np.angle(heading / (heading.mean() or 1.0)))
+    turned = float(np.percentile(spread, 95)) * 2
+    off = q4.angle_between(mine, predicted)
+    return _Read(reading, off, predicted, float(np.angle(np.exp(1j * yaw))), turned)
+
+
+def _choose(reads: list[_Read], delay_s: float, times: tuple[float, float]) -> Lie | str:
+    labelled = reads[0]
+    ranked = sorted(reads[1:], key=lambda read: round(np.degrees(read.mean) * 2))
+    if labelled.mean <= ranked[0].mean * 1.05 + np.radians(0.3):
+        return _lie(labelled, labelled, labelled.off >= 0, delay_s, times)
+    for read in ranked[:1]:
+        telling = q4.angle_between(read.predicted, labelled.predicted) > TELLING
+        if np.count_nonzero(telling) < MIN_TELLING:
+            break
+        lie = _lie(read, labelled, telling, delay_s, times)
+        needs_turn = read.reading.kind in ("yaw_offset", "yaw_sign")
+        if needs_turn and read.turned < MIN_TURN:
+            return "the vehicle hardly turns"
+        if lie.left < FITS and lie.left < CLEARLY * lie.labelled:
+            return lie
+    return _lie(labelled, labelled, labelled.off >= 0, delay_s, times)
+
+
+def _lie(
+    read: _Read, labelled: _Read, telling: Bools, delay_s: float, times: tuple[float, float]
+) -> Lie:
+    return Lie(
+        read.reading.kind,
+        read.reading.says,
+        float(np.median(read.off[telling])),
+        float(np.median(labelled.off[telling])),
+        read.yaw,
+        float(np.count_nonzero(telling) * GRID_S),
+        delay_s,
+        times,
+    )

@@ -1,0 +1,388 @@
+"""The rules of the kinematic judge: each says one kind of conclusion."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from mavframecheck.checks.base import Check, Observation, Place, Verdict
+from mavframecheck.checks.motion import attitude, axes, twist
+from mavframecheck.checks.motion import judge as judging
+from mavframecheck.model import Scalar
+from mavframecheck.model import Subject as Whom
+from mavframecheck.vehicle import Context
+from mavframecheck.vehicle.clocks import Seen
+from mavframecheck.vehicle.tracks import Source
+from mavframecheck.wire import Batch, Dialect
+
+Values = dict[str, Scalar]
+
+
+class MotionCheck(Check):
+    """Asks the judge of the recording about every stream."""
+
+    rotation = False
+    """Whether a finding is about the attitude alone."""
+
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
+        """Listen with nothing heard so far."""
+        super().__init__(params, dialect)
+        self._judge: judging.Judge | None = None
+
+    def update(self, batch: Batch, context: Context) -> None:
+        """Let the judge that all these rules share hear a batch."""
+        self._judge = judging.Judge.of(context)
+        self._judge.update(batch, context)
+
+    def finish(self) -> Iterable[Observation]:
+        """Return one observation for every stream in which the mistake is."""
+        for subject in self._subjects():
+            told = self.told(subject)
+            if told:
+                yield self._observation(subject, told)
+
+    def _subjects(self) -> Iterable[judging.Subject]:
+        if self._judge is not None:
+            yield from (each for each in self._judge.subjects if self.concerns(each))
+
+    def _observation(self, subject: judging.Subject, told: Values) -> Observation:
+        track = subject.track
+        values = {
+            "message": track.key.message,
+            "reference": subject.reference,
+            "frame": subject.frame.name,
+            "by_autopilot": subject.by_autopilot,
+            **told,
+        }
+        name = _rotation_field(track.source) if self.rotation or told.get("what") == "yaw" else None
+        whom = Whom(track.key.sender >> 8, track.key.sender & 0xFF, track.key.message, name)
+        return Observation(whom, _place(track.first), _place(track.last), track.rows, values)
+
+    def verdict(self) -> Verdict:
+        """Return the rows of streams that could be told, else what was missing."""
+        concerned = list(self._subjects())
+        told = [subject for subject in concerned if self.why_not(subject) == ""]
+        if told or not concerned:
+            return Verdict(sum(subject.track.rows for subject in told))
+        reasons = {f"{each.track.key.message}: {self.why_not(each)}" for each in concerned}
+        return Verdict(0, "; ".join(sorted(reasons)))
+
+    @abstractmethod
+    def concerns(self, subject: judging.Subject) -> bool:
+        """Return whether the rule is about a stream."""
+
+    @abstractmethod
+    def why_not(self, subject: judging.Subject) -> str:
+        """Return why it cannot be told; nothing where it can."""
+
+    @abstractmethod
+    def told(self, subject: judging.Subject) -> Values | None:
+        """Return the values for the rule's texts where the mistake is made."""
+
+
+def _rotation_field(source: Source) -> str:
+    return "yaw" if source.euler else "q"
+
+
+def _place(seen: Seen) -> Place:
+    return Place(*seen)
+
+
+class _Axes(MotionCheck):
+    """A rule about where axes point, by position or by a velocity of the world."""
+
+    kinds: tuple[str, ...] = ()
+
+    def concerns(self, subject: judging.Subject) -> bool:
+        """Return whether a stream has a position, or a velocity of the world."""
+        return subject.place != judging.NOTHING or subject.speed != judging.NOTHING
+
+    def why_not(self, subject: judging.Subject) -> str:
+        """Return what was missing to tell."""
+        reasons = [each for each in (subject.place, subject.speed) if isinstance(each, str)]
+        fits = [each for each in (subject.place, subject.speed) if isinstance(each, axes.Fit)]
+        if not fits:
+            return next((each for each in reasons if each != judging.NOTHING), "")
+        return "" if any(self.known(fit) for fit in fits) else self.missing
+
+    missing = "it does not move both north-south and east-west"
+
+    def known(self, fit: axes.Fit) -> bool:
+        """Return whether there was enough motion for this rule."""
+        return fit.yaw_known
+
+    def told(self, subject: judging.Subject) -> Values | None:
+        """Return what the axes hold."""
+        for fit, what, fields in (
+            (subject.place, "position", ("x", "y", "z")),
+            (subject.speed, "velocity", _velocity_fields(subject)),
+        ):
+            if isinstance(fit, axes.Fit) and fit.kind in self.kinds and self.counts(subject, fit):
+                return {**fit_values(fit), "what": what, **_named(fit, fields)}
+        return None
+
+    def counts(self, _subject: judging.Subject, _fit: axes.Fit) -> bool:
+        """Return whether a conclusion is of the kind that the rule is about."""
+        return True
+
+
+def _velocity_fields(subject: judging.Subject) -> tuple[str, str, str]:
+    message = subject.track.key.message
+    if message == "VISION_SPEED_ESTIMATE":
+        return ("x", "y", "z")
+    return ("vn", "ve", "vd") if message in ("GPS_INPUT", "HIL_GPS") else ("vx", "vy", "vz")
+
+
+def _named(fit: axes.Fit, fields: tuple[str, str, str]) -> Values:
+    """Return what the axes hold, by the names of the fields."""
+    says = fit.says
+    for axis, name in zip("xyz", fields, strict=True):
+        says = says.replace(f"{axis} holds", f"{name} holds").replace(f"{axis} is ", f"{name} is ")
+        says = says.replace(f"{axis} points", f"{name} points").replace(f"of {axis},", f"of {name},")
+    return {"says": says, "down_field": fields[2]}
+
+
+def fit_values(fit: axes.Fit) -> Values:
+    """Return a fit as values for texts."""
+    return {
+        "is_called": fit.name,
+        "left": fit.residual_m,
+        "labelled": fit.labelled_m,
+        "measured_in": "m",
+        "track_m": fit.track_m,
+        "span_s": fit.span_s,
+        "yaw_deg": float(np.degrees(fit.yaw)),
+        "scale": fit.scale,
+        "delay_s": fit.delay_s,
+    }
+
+
+class LocalAxes(_Axes):
+    """Axes that hold something else than the label says."""
+
+    kinds = ("permuted",)
+
+
+class Vertical(_Axes):
+    """Axes of which only the vertical one is reversed."""
+
+    kinds = ("vertical",)
+    missing = "it hardly climbs or sinks"
+
+    def known(self, fit: axes.Fit) -> bool:
+        """Return whether it climbed enough."""
+        return fit.heights_known
+
+
+class _Poses(MotionCheck):
+    """A rule about the attitude in a pose."""
+
+    lies: tuple[str, ...] = ()
+
+    def concerns(self, subject: judging.Subject) -> bool:
+        """Return whether a stream has an attitude."""
+        return subject.lie != judging.NOTHING
+
+    def why_not(self, subject: judging.Subject) -> str:
+        """Return what was missing to tell."""
+        return subject.lie if isinstance(subject.lie, str) else ""
+
+    def told(self, subject: judging.Subject) -> Values | None:
+        """Return how the attitude is to be read; nothing where the whole pose is in other axes."""
+        lie = subject.lie
+        if isinstance(lie, str) or lie.kind not in self.lies or in_other_axes(subject):
+            return None
+        if not self.counts(subject, lie):
+            return None
+        return lie_values(lie)
+
+    def counts(self, _subject: judging.Subject, _lie: attitude.Lie) -> bool:
+        """Return whether a conclusion is of the kind that the rule is about."""
+        return True
+
+
+def in_other_axes(subject: judging.Subject) -> bool:
+    """Return whether the position of a stream is in other axes than labelled: its attitude then is too."""
+    return isinstance(subject.place, axes.Fit) and subject.place.kind not in ("agrees", "undecided")
+
+
+def lie_values(lie: attitude.Lie) -> Values:
+    """Return a conclusion about an attitude as values for texts."""
+    return {
+        "says": lie.says,
+        "left": float(np.degrees(lie.left)),
+        "labelled": float(np.degrees(lie.labelled)),
+        "measured_in": "degrees",
+        "yaw_deg": float(np.degrees(lie.yaw)),
+        "seconds": lie.seconds,
+        "delay_s": lie.delay_s,
+    }
+
+
+def quarter(yaw_deg: float, tolerance_deg: float) -> bool:
+    """Return whether a turn is one by 90 or 180 degrees."""
+    return min(abs(abs(yaw_deg) - each) for each in (90.0, 180.0)) <= tolerance_deg
+
+
+class QuarterTurn(MotionCheck):
+    """Frames, or headings, that are off by 90 or 180 degrees."""
+
+    quarters = True
+
+    def concerns(self, subject: judging.Subject) -> bool:
+        """Return whether a stream has a heading that must be from north."""
+        posed = subject.place != judging.NOTHING or subject.lie != judging.NOTHING
+        return posed and not subject.frame.free_heading
+
+    def why_not(self, subject: judging.Subject) -> str:
+        """Return what was missing to tell."""
+        place, lie = subject.place, subject.lie
+        if (isinstance(place, axes.Fit) and place.yaw_known) or isinstance(lie, attitude.Lie):
+            return ""
+        if isinstance(place, axes.Fit):
+            return "it does not move both north-south and east-west"
+        return lie if place == judging.NOTHING else place
+
+    def told(self, subject: judging.Subject) -> Values | None:
+        """Return by how much the heading is off."""
+        place, lie = subject.place, subject.lie
+        if isinstance(place, axes.Fit) and place.kind in ("turned", "quarter"):
+            values = {**fit_values(place), "what": "frame"}
+        elif isinstance(lie, attitude.Lie) and lie.kind == "yaw_offset" and not in_other_axes(subject):
+            values = {**lie_values(lie), "what": "yaw"}
+        else:
+            return None
+        off = abs(float(values["yaw_deg"] or 0.0))
+        is_quarter = quarter(off, self.params["quarter_tolerance_deg"])
+        enough = off >= self.params["min_yaw_deg"]
+        return values if enough and is_quarter == self.quarters else None
+
+
+class Unaligned(QuarterTurn):
+    """Frames, or headings, that are off by any other constant angle."""
+
+    quarters = False
+
+
+class YawSign(_Poses):
+    """Yaw that counts the wrong way."""
+
+    lies = ("yaw_sign",)
+    rotation = True
+
+
+class EulerSwapped(_Poses):
+    """Roll and pitch that have changed places."""
+
+    lies = ("swapped",)
+
+
+class QuaternionOrder(_Poses):
+    """Quaternions in another order of elements."""
+
+    lies = ("order",)
+    rotation = True
+
+
+class BodyAxes(MotionCheck):
+    """Attitudes, or velocities, of front-left-up axes."""
+
+    def concerns(self, subject: judging.Subject) -> bool:
+        """Return whether a stream says something of the body."""
+        return subject.lie != judging.NOTHING or subject.twist != judging.NOTHING
+
+    def why_not(self, subject: judging.Subject) -> str:
+        """Return what was missing to tell."""
+        both = [each for each in (subject.lie, subject.twist) if each != judging.NOTHING]
+        reasons = [each for each in both if isinstance(each, str)]
+        return reasons[0] if len(reasons) == len(both) else ""
+
+    def told(self, subject: judging.Subject) -> Values | None:
+        """Return which reading fits."""
+        lie, turn = subject.lie, subject.twist
+        if isinstance(lie, attitude.Lie) and lie.kind == "body" and _euler(subject):
+            if not in_other_axes(subject):
+                return {**lie_values(lie), "what": "attitude"}
+        if isinstance(turn, twist.Twist) and turn.kind == "flu":
+            return {**twist_values(turn), "what": "velocity"}
+        return None
+
+
+def _euler(subject: judging.Subject) -> bool:
+    return subject.track.source.euler
+
+
+def twist_values(turn: twist.Twist) -> Values:
+    """Return a conclusion about a velocity as values for texts."""
+    return {
+        "says": turn.says,
+        "left": turn.left_mps,
+        "labelled": turn.labelled_mps,
+        "measured_in": "m/s",
+        "seconds": turn.seconds,
+    }
+
+
+class PoseRotation(_Poses):
+    """Quaternions that do not belong to their position: the inverse, or of other axes."""
+
+    lies = ("inverse", "frames", "body", "yaw_sign", "swapped")
+    rotation = True
+
+    def counts(self, subject: judging.Subject, lie: attitude.Lie) -> bool:
+        """Return whether it is a quaternion: angles have rules of their own."""
+        return not _euler(subject) and (lie.kind not in ("yaw_sign", "swapped"))
+
+
+class VectorFrame(MotionCheck):
+    """Velocities that are in the axes of the world where the label says the body, and the reverse."""
+
+    def concerns(self, subject: judging.Subject) -> bool:
+        """Return whether a stream has a velocity with a frame of its own."""
+        return subject.twist != judging.NOTHING
+
+    def why_not(self, subject: judging.Subject) -> str:
+        """Return what was missing to tell."""
+        return subject.twist if isinstance(subject.twist, str) else ""
+
+    def told(self, subject: judging.Subject) -> Values | None:
+        """Return which axes fit; nothing where the whole pose is in other axes."""
+        turn = subject.twist
+        if isinstance(turn, str) or turn.kind in ("labelled", "flu") or in_other_axes(subject):
+            return None
+        return twist_values(turn)
+
+
+class EstimateScale(MotionCheck):
+    """Positions whose metres are longer or shorter than the vehicle's."""
+
+    def concerns(self, subject: judging.Subject) -> bool:
+        """Return whether a stream is an estimate from outside."""
+        return subject.place != judging.NOTHING and not subject.by_autopilot
+
+    def why_not(self, subject: judging.Subject) -> str:
+        """Return what was missing to tell."""
+        if isinstance(subject.place, str):
+            return subject.place
+        return "" if self._sure(subject.place) else f"less than {self.params['min_track_m']:.0f} m of track"
+
+    def _sure(self, fit: axes.Fit) -> bool:
+        per_step = fit.track_m and fit.residual_m <= self.params["max_residual_share"] * _step_m(fit)
+        return fit.track_m >= self.params["min_track_m"] and bool(per_step)
+
+    def told(self, subject: judging.Subject) -> Values | None:
+        """Return the scale."""
+        fit = subject.place
+        if isinstance(fit, str) or not self._sure(fit) or fit.kind == "undecided":
+            return None
+        limit = 1 + self.params["tolerance"]
+        wrong = fit.scale > limit or fit.scale < 1 / limit
+        return fit_values(fit) if wrong else None
+
+
+def _step_m(fit: axes.Fit) -> float:
+    """Return the usual displacement, m."""
+    return fit.step_m

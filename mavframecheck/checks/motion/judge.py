@@ -1,0 +1,332 @@
+"""The kinematic judge: every stream of poses and velocities beside what the vehicle itself really did.
+
+It listens once for all rules of a recording, and draws its conclusions once, at the end. An estimate is
+never judged by itself: where the vehicle's own position may be made from the stream under test, GNSS or the
+truth of a simulator has to confirm it.
+"""
+
+from __future__ import annotations
+
+import functools
+import weakref
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mavframecheck.checks.motion import attitude as attitudes
+from mavframecheck.checks.motion import axes, twist
+from mavframecheck.checks.motion.series import Series, series_of
+from mavframecheck.semantics.constants import constant
+from mavframecheck.vehicle import Context
+from mavframecheck.vehicle.tracks import Track, Tracks
+from mavframecheck.wire import Batch, Table
+
+Floats = npt.NDArray[np.float64]
+
+POSES = (
+    "VISION_POSITION_ESTIMATE",
+    "GLOBAL_VISION_POSITION_ESTIMATE",
+    "VICON_POSITION_ESTIMATE",
+    "ATT_POS_MOCAP",
+    "ODOMETRY",
+    "LOCAL_POSITION_NED",
+)
+VELOCITIES = ("VISION_SPEED_ESTIMATE", "GPS_INPUT", "HIL_GPS", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED")
+_PARAMETERS = (b"EK3_SRC1_POSXY", b"EK3_SRC1_POSZ", b"EK3_SRC1_YAW", b"EKF2_EV_CTRL", b"VISO_TYPE")
+_ALIGNING = (2, 3)
+"""VISO_TYPE of cameras whose heading ArduPilot aligns itself."""
+_EXTERNAL = 6
+
+
+def _frame(name: str) -> int:
+    return constant(f"MAV_FRAME.{name}")
+
+
+@functools.cache
+def frames() -> dict[int, axes.Frame]:
+    """Return what the axes of a stream are, by MAV_FRAME."""
+    flu = np.diag([1.0, -1, -1])
+    enu = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])
+    return {
+        _frame("LOCAL_NED"): axes.NED,
+        _frame("LOCAL_ENU"): axes.Frame(enu, free_heading=False, name="east, north, up"),
+        _frame("LOCAL_FRD"): axes.Frame(np.eye(3), free_heading=True, name="forward, right, down"),
+        _frame("LOCAL_FLU"): axes.Frame(flu, free_heading=True, name="forward, left, up"),
+    }
+
+
+NOTHING = "it holds none"
+"""In place of a conclusion: the stream has no such quantity."""
+
+
+class Subject(NamedTuple):
+    """A stream, and what was concluded about it."""
+
+    track: Track
+    system: int
+    """The vehicle that it is about."""
+    by_autopilot: bool
+    frame: axes.Frame
+    reference: str
+    """Message that it was compared with."""
+    place: axes.Fit | str
+    lie: attitudes.Lie | str
+    twist: twist.Twist | str
+    speed: axes.Fit | str
+    """Its velocity, added up, where that is labelled as of the world."""
+
+
+class _Truth(NamedTuple):
+    """What a vehicle really did."""
+
+    place: Series | None
+    why: str
+    """Why there is none."""
+    attitude: Series | None
+    rate: float
+    """Seconds of the vehicle's clock per second of receive time."""
+
+
+_JUDGES: weakref.WeakKeyDictionary[Context, Judge] = weakref.WeakKeyDictionary()
+
+
+class Judge:
+    """The streams of one recording."""
+
+    def __init__(self, context: Context) -> None:
+        """Listen with nothing heard so far."""
+        self._context = weakref.ref(context)
+        self._tracks = Tracks()
+        self._batch: weakref.ref[Batch] | None = None
+        self.parameters: dict[tuple[int, bytes], float] = {}
+        self._roles: dict[int, str] = {}
+
+    @staticmethod
+    def of(context: Context) -> Judge:
+        """Return the judge that all rules of a recording share."""
+        return _JUDGES.setdefault(context, Judge(context))
+
+    def update(self, batch: Batch, context: Context) -> None:
+        """Take in a batch, once."""
+        if self._batch is not None and self._batch() is batch:
+            return
+        self._batch = weakref.ref(batch)
+        self._tracks.update(batch)
+        table = batch.tables.get("PARAM_VALUE")
+        if table is not None:
+            self._learn(table)
+        self._roles = {key.sender: context.role(key.sender) for key in self._tracks.tracks}
+
+    def _learn(self, table: Table) -> None:
+        named = np.flatnonzero(np.isin(table["param_id"], _PARAMETERS))
+        for row in named.tolist():
+            key = int(table.frames.sysid[row]), bytes(table["param_id"][row])
+            value = table["param_value"][row : row + 1]
+            real = not int(table["param_type"][row]) <= 8 or float(value[0]).is_integer()
+            self.parameters[key] = float(value[0] if real else value.view(np.int32)[0])
+
+    @property
+    def timed(self) -> bool:
+        """Whether there are receive times."""
+        return self._tracks.timed
+
+    @functools.cached_property
+    def subjects(self) -> list[Subject]:
+        """Return every stream of poses or velocities, judged."""
+        return list(self._judged())
+
+    def _judged(self) -> Iterator[Subject]:
+        for track in list(self._tracks.tracks.values()):
+            if track.key.message in (*POSES, *VELOCITIES):
+                system = self._about(track.key.sender)
+                own = self._roles[track.key.sender] == "autopilot"
+                if not (own and track.key.message == "ODOMETRY"):
+                    yield self._subject(track, system, own=own)
+
+    def _about(self, sender: int) -> int:
+        """Return the system a sender speaks of: its own, else the only one with an autopilot."""
+        systems = {each >> 8 for each, role in self._roles.items() if role == "autopilot"}
+        if sender >> 8 in systems:
+            return sender >> 8
+        return systems.pop() if len(systems) == 1 else -1
+
+    def _subject(self, track: Track, system: int, *, own: bool) -> Subject:
+        nothing = NOTHING
+        frame = self._frame_of(track, system)
+        if frame is None:
+            why = "its frame has no axes that could be compared"
+            return Subject(track, system, own, axes.NED, "", why, why, why, why)
+        truth = self._truth(system, track)
+        stream = self._series(track)
+        reference = truth.place.message if truth.place is not None else ""
+        judged = Subject(track, system, own, frame, reference, nothing, nothing, nothing, nothing)
+        if track.key.message in POSES:
+            judged = judged._replace(place=self._place(stream, truth, frame))
+        if track.source.attitude is not None and not own:
+            judged = judged._replace(lie=self._lie(stream, truth, judged))
+        if track.source.velocity is not None and track.key.message != "ODOMETRY":
+            judged = judged._replace(speed=self._speed(stream, truth, frame))
+        if track.key.message == "ODOMETRY":
+            judged = judged._replace(twist=self._twist(stream, truth, judged))
+        return judged
+
+    def _frame_of(self, track: Track, system: int) -> axes.Frame | None:
+        if track.key.message == "ODOMETRY":
+            return frames().get(track.key.variant[0])
+        if self.parameters.get((system, b"VISO_TYPE")) in _ALIGNING and track.key.message == POSES[0]:
+            return frames()[_frame("LOCAL_FRD")]
+        return axes.NED
+
+    def _series(self, track: Track) -> Series:
+        if track.key not in self._cache:
+            self._cache[track.key] = series_of(track)
+        return self._cache[track.key]
+
+    @functools.cached_property
+    def _cache(self) -> dict[object, Series]:
+        return {}
+
+    def _own(self, system: int, message: str) -> Track | None:
+        """Return the track of a message of a system's autopilot; the longest of several."""
+        found = [
+            track
+            for key, track in self._tracks.tracks.items()
+            if key.message == message
+            and key.sender >> 8 == system
+            and self._roles[key.sender] == "autopilot"
+        ]
+        return max(found, key=lambda track: track.rows) if found else None
+
+    def _truth(self, system: int, subject: Track) -> _Truth:
+        """Return what is independent of a stream."""
+        attitude = self._own(system, "ATTITUDE") or self._own(system, "ATTITUDE_QUATERNION")
+        place, why = self._place_of(system)
+        if subject.key.message == "GLOBAL_POSITION_INT" and place is None:
+            place = self._series(subject)
+        lies = None if attitude is None else self._series(attitude)
+        return _Truth(place, why, lies, 1.0 if lies is None else _rate(lies))
+
+    def _place_of(self, system: int) -> tuple[Series | None, str]:
+        """Return the position to compare with; or why there is none."""
+        if not self.timed:
+            return None, "the recording has no receive times"
+        if system not in self._places:
+            self._places[system] = self._find_place(system)
+        return self._places[system]
+
+    @functools.cached_property
+    def _places(self) -> dict[int, tuple[Series | None, str]]:
+        return {}
+
+    def _find_place(self, system: int) -> tuple[Series | None, str]:
+        whole = self._own(system, "GLOBAL_POSITION_INT")
+        gnss = self._own(system, "GPS_RAW_INT")
+        truth = self._own(system, "SIMSTATE")
+        own = None if whole is None else self._series(whole)
+        for witness in (gnss, truth):
+            if witness is None:
+                continue
+            seen = self._series(witness)
+            if own is not None and _confirms(seen, own):
+                return own, ""
+            if witness is gnss and len(seen.t) > 20:
+                return seen, ""
+            if witness is truth:
+                return seen, ""
+        if own is not None and not self._fed(system):
+            return own, ""
+        if own is None:
+            return None, "no GLOBAL_POSITION_INT and no GNSS position of the vehicle"
+        return None, (
+            "the vehicle's own position may be made from it, and neither a GNSS fix nor the truth of a "
+            "simulator tells where it was"
+        )
+
+    def _fed(self, system: int) -> bool:
+        """Return whether the estimator of a vehicle may be fed by external poses; yes where unknown."""
+        sources = [self.parameters.get((system, n)) for n in (b"EK3_SRC1_POSXY", b"EK3_SRC1_POSZ")]
+        control = self.parameters.get((system, b"EKF2_EV_CTRL"))
+        if control is not None:
+            return control != 0
+        return None in sources or _EXTERNAL in sources
+
+    def _place(self, stream: Series, truth: _Truth, frame: axes.Frame) -> axes.Fit | str:
+        if truth.place is None:
+            return truth.why
+        fit = axes.compare(stream, truth.place, frame)
+        return fit.why if isinstance(fit, axes.Undecided) else fit
+
+    def _speed(self, stream: Series, truth: _Truth, frame: axes.Frame) -> axes.Fit | str:
+        if truth.place is None:
+            return truth.why
+        fit = axes.compare(stream.integrated(truth.rate), truth.place, frame)
+        return fit.why if isinstance(fit, axes.Undecided) else fit
+
+    def _lie(self, stream: Series, truth: _Truth, judged: Subject) -> attitudes.Lie | str:
+        if truth.attitude is None:
+            return "no ATTITUDE of the vehicle"
+        since = 0.0 if truth.place is None else _first_move(truth.place)
+        fit = judged.place
+        delay = fit.delay_s if isinstance(fit, axes.Fit) and fit.delay_known else None
+        return attitudes.compare(
+            stream,
+            truth.attitude,
+            free_heading=judged.frame.free_heading,
+            since_s=since,
+            delay_s=delay,
+        )
+
+    def _twist(self, stream: Series, truth: _Truth, judged: Subject) -> twist.Twist | str:
+        child = judged.track.key.variant[1]
+        body = child in (_frame("BODY_FRD"), _frame("BODY_NED"))
+        if truth.place is None or truth.attitude is None:
+            return truth.why or "no ATTITUDE of the vehicle"
+        if not body and child != judged.track.key.variant[0]:
+            return "its child frame has no axes that could be compared"
+        fit = judged.place
+        known = isinstance(fit, axes.Fit) and fit.yaw_known
+        yaw = fit.yaw if known and isinstance(fit, axes.Fit) else 0.0
+        if judged.frame.free_heading and not known:
+            return "the heading of its frame is not known"
+        delay = fit.delay_s if isinstance(fit, axes.Fit) and fit.delay_known else 0.05
+        return twist.compare(
+            stream,
+            truth.place,
+            truth.attitude,
+            body=body,
+            yaw=yaw,
+            delay_s=delay,
+            rate=truth.rate,
+        )
+
+
+def _rate(series: Series) -> float:
+    """Return seconds of the stamps per second of receive time."""
+    good = np.isfinite(series.stamp)
+    t, stamp = series.t[good], series.stamp[good]
+    if len(t) < 20:
+        return 1.0
+    half = len(t) // 2
+    rates = (stamp[half:] - stamp[: len(t) - half]) / (t[half:] - t[: len(t) - half])
+    rate = float(np.median(rates))
+    return rate if 0.05 < rate < 100 else 1.0
+
+
+def _confirms(witness: Series, own: Series) -> bool:
+    """Return whether a vehicle's own position goes where the witness goes."""
+    fit = axes.compare(own, witness, axes.NED)
+    if isinstance(fit, axes.Undecided):
+        return False
+    return fit.kind == "agrees" and fit.yaw_known
+
+
+def _first_move(place: Series) -> float:
+    """Return when the vehicle left the place where it was first heard, s; forever where it did not."""
+    given = np.isfinite(place.place[:, :2]).all(axis=1)
+    where, t = np.nan_to_num(place.place[given]), place.t[given]
+    if not len(t):
+        return np.inf
+    away = np.linalg.norm(where - where[0], axis=1) > 1.0
+    return float(t[np.argmax(away)]) if away.any() else np.inf

@@ -1,0 +1,112 @@
+"""In which axes a velocity is given: turned into the world as labelled, and as it might be meant."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mavframecheck.checks.motion.series import Series
+from mavframecheck.geo import quaternions as q4
+from mavframecheck.geo.alignment import trimmed_rms, yaw_matrix
+
+Floats = npt.NDArray[np.float64]
+
+GRID_S = 0.1
+SPAN_S = 1.0
+MIN_MPS = 0.5
+"""Slower than this, m/s, a velocity says little."""
+MIN_TELLING = 30
+"""Moments, a tenth of a second apart, at which the two readings differ by that much."""
+CLEARLY = 0.35
+FITS = 0.35
+"""Share of the speed that the right reading may leave."""
+
+_FLU: Floats = np.diag([1.0, -1, -1])
+_ENU: Floats = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])
+
+
+class Twist(NamedTuple):
+    """How a velocity is to be read."""
+
+    kind: str
+    """``labelled``, ``world``, ``body``, ``inverse``, ``flu`` or ``enu``."""
+    says: str
+    left_mps: float
+    labelled_mps: float
+    seconds: float
+    times: tuple[float, float]
+
+
+_SAYS = {
+    "world": "the velocity is in the axes of the world",
+    "body": "the velocity is in the axes of the body",
+    "inverse": "the velocity was turned the wrong way (from the body to the world twice over)",
+    "flu": "the velocity is in front-left-up axes",
+    "enu": "the velocity is in east-north-up axes",
+}
+
+
+def compare(
+    stream: Series,
+    place: Series,
+    attitude: Series,
+    *,
+    body: bool,
+    yaw: float,
+    delay_s: float,
+    rate: float,
+) -> Twist | str:
+    """Say in which axes the velocity of `stream` is; it is labelled `body` or world.
+
+    `place` and `attitude` are the references, `yaw` the heading of the stream's frame, `rate` seconds of
+    the vehicle per second of receive time.
+    """
+    at = stream.t[np.diff(np.floor(stream.t / GRID_S), prepend=-np.inf) > 0]
+    true = place.steps(at - delay_s, SPAN_S) / (SPAN_S * rate)
+    given = _smoothed(stream, at)
+    lies = attitude.attitudes(at - delay_s)
+    fine = np.isfinite(true).all(axis=1) & np.isfinite(given).all(axis=1)
+    fine &= np.isfinite(lies).all(axis=1)
+    fine &= np.linalg.norm(np.nan_to_num(true), axis=1) > MIN_MPS
+    if np.count_nonzero(fine) < MIN_TELLING:
+        return "the vehicle hardly moves"
+    v, r, t = given[fine], lies[fine], true[fine]
+    scale = float(np.linalg.norm(v) / np.linalg.norm(t))
+    v = v / scale if scale > 0 else v
+    world = yaw_matrix(-yaw)
+    readings = {
+        "body": q4.turn_by(r, v),
+        "world": v @ world.T,
+        "level": q4.turn_by(q4.about_z(q4.euler_from_quaternion(r)[:, 2]), v),
+        "inverse": q4.turn_by(q4.inverse(r), v),
+        "flu": q4.turn_by(r, v @ _FLU),
+        "enu": v @ _ENU.T,
+    }
+    return _choose(readings, t, "body" if body else "world", (float(at[0]), float(at[-1])))
+
+
+def _smoothed(stream: Series, at: Floats) -> Floats:
+    """Return the mean velocity over the span around each time."""
+    shifts = np.linspace(-SPAN_S / 2, SPAN_S / 2, 9)
+    total: Floats = np.mean([stream.velocities(at + shift) for shift in shifts], axis=0)
+    return total
+
+
+def _choose(
+    readings: dict[str, Floats], true: Floats, label: str, times: tuple[float, float]
+) -> Twist | str:
+    speed = float(np.sqrt(np.mean(np.square(true).sum(axis=1))))
+    off = {name: np.linalg.norm(v - true, axis=1) for name, v in readings.items()}
+    left = {name: trimmed_rms(each, 0.95) for name, each in off.items()}
+    best = min(left, key=lambda name: left[name])
+    fine = left[label] < FITS * speed or left["level"] < max(FITS * speed, 1.2 * left[best])
+    if best in (label, "level") or fine:
+        return Twist("labelled", "", left[label], left[label], len(true) * GRID_S, times)
+    differ = np.linalg.norm(readings[best] - readings[label], axis=1) > MIN_MPS
+    if np.count_nonzero(differ) < MIN_TELLING:
+        return "the vehicle points along the axes of the world"
+    if left[best] > FITS * speed or left[best] > CLEARLY * left[label]:
+        return "the velocity follows the vehicle in no axes"
+    return Twist(best, _SAYS[best], left[best], left[label], len(true) * GRID_S, times)
