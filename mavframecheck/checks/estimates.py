@@ -131,6 +131,10 @@ class UnsignalledReset(_PoseCheck):
         table = table.take((frames.version == 2) & frames.t_valid & np.isfinite(_xyz(table)).all(1))
         if found.tail is not None:
             table = join([found.tail, table])
+        if not len(table):
+            return
+        fresh = np.any(np.diff(_xyz(table), axis=0) != 0, axis=1)
+        table = table.take(np.concatenate(([True], fresh)))  # repeated poses hide how fast it goes
         found.tail = table.take(np.arange(max(len(table) - 3, 0), len(table))).compact()
         if len(table) < 4:
             return

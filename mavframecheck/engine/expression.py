@@ -169,12 +169,16 @@ class Expression:
         return lambda scope: operator(operand(scope))
 
     def _boolean(self, node: ast.BoolOp) -> Evaluate:
+        """Compile ``a and b``: `b` is left out where `a` settles it for every row."""
         parts = [self._compile(value) for value in node.values]
-        operator = np.logical_and if isinstance(node.op, ast.And) else np.logical_or
+        conjunction = isinstance(node.op, ast.And)
+        operator = np.logical_and if conjunction else np.logical_or
 
         def evaluate(scope: Scope) -> Any:
             result = parts[0](scope)
             for part in parts[1:]:
+                if np.all(result) if not conjunction else not np.any(result):
+                    break
                 result = operator(result, part(scope))
             return result
 

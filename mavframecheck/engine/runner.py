@@ -157,8 +157,10 @@ class Runner:
             scope = RuleScope(rows, binding)
             if rule.when is not None:
                 seen &= rule.when(scope)
-            found = seen & rule.flag(scope) & ~hit
             looked |= seen
+            if not seen.any():
+                continue
+            found = seen & rule.flag(scope) & ~hit
             hit |= found
             by[found] = k
             if rule.worst is not None and found.any():
@@ -241,7 +243,7 @@ def _concerns(binding: Binding, rows: Rows) -> Bools:
     """Return (n,) rows that a binding is about, as far as the message itself tells."""
     concerned = np.ones(len(rows), np.bool_)
     for condition in binding.conditions:
-        concerned &= np.isin(rows.raw(condition.field), condition.values)
+        concerned &= rows.has(condition)
     return concerned
 
 

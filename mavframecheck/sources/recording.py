@@ -15,7 +15,7 @@ from mavframecheck.sources.stream import ByteStream, NoRecordingError, SourceErr
 from mavframecheck.wire.chunk import Chunk, whole
 
 _STDIN_NAME = "<stdin>"
-BATCH_BYTES = 2 * 1024 * 1024
+BATCH_BYTES = 4 * 1024 * 1024
 """How much MAVLink one batch of chunks holds, about 64k frames."""
 
 

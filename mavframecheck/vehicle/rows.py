@@ -16,7 +16,7 @@ from mavframecheck.semantics import catalogue, masks
 from mavframecheck.semantics.constants import entries, entry_name
 from mavframecheck.semantics.enums import AltRef, Axis
 from mavframecheck.semantics.references import selected_height
-from mavframecheck.semantics.tags import FieldTag, Sentinel
+from mavframecheck.semantics.tags import Condition, FieldTag, Sentinel
 from mavframecheck.vehicle.context import Context, Known
 from mavframecheck.wire import Table
 from mavframecheck.wire.table import join as join_tables
@@ -100,6 +100,13 @@ class Rows:
     def raw(self, field: str) -> Any:
         """Return a column as on the wire, widened so that arithmetic on it cannot wrap."""
         return self.cached(("raw", field), lambda: widened(self.table[field]))
+
+    def has(self, condition: Condition) -> Bools:
+        """Return (n,) rows in which a selector has one of the values of a condition."""
+        return self.cached(
+            ("has", condition),
+            lambda: np.isin(self.raw(condition.field), condition.values),
+        )
 
     def si(self, tag: FieldTag) -> Any:
         """Return a tagged column in SI (degrees for latitude and longitude), NaN where it is unknown."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import functools
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +18,11 @@ Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 
-@dataclass(slots=True)
 class Frames:
-    """The frames of a batch in the order in which they were received; every array is (n,)."""
+    """The frames of a batch in the order in which they were received; every array is (n,).
+
+    Frames taken from others take over a column only when somebody looks at it.
+    """
 
     start: Ints
     """Index of the magic byte in the buffer of the batch."""
@@ -53,18 +56,39 @@ class Frames:
     clock_us: Ints
     """Latest `t_us` that could be believed so far: the time of the recording, which never goes back."""
 
+    def __init__(self, **columns: npt.NDArray[Any]) -> None:
+        """Hold `columns` by name."""
+        self.__dict__.update(columns)
+        self._source: Frames | None = None
+        self._rows: Ints | Bools | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        """Take a column over from the frames that these were taken from."""
+        source = self.__dict__.get("_source")
+        if source is None or name not in COLUMNS:
+            raise AttributeError(name)
+        column = self.__dict__[name] = getattr(source, name)[self._rows]
+        return column
+
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self.start)
 
     def take(self, rows: Ints | Bools) -> Frames:
         """Return the frames at `rows`."""
-        return Frames(*(getattr(self, f.name)[rows] for f in fields(self)))
+        taken = Frames()
+        taken._source, taken._rows = self, rows
+        return taken
 
-    @property
+    def own(self) -> Frames:
+        """Return the same frames without holding on to those they were taken from."""
+        return Frames(**{name: getattr(self, name) for name in COLUMNS})
+
+    @functools.cached_property
     def sender(self) -> Ints:
         """(n,) system and component as one number: ``sysid * 256 + compid``."""
-        return self.sysid.astype(np.int64) * 256 + self.compid
+        sender: Ints = self.sysid.astype(np.int64) * 256 + self.compid
+        return sender
 
     @property
     def good(self) -> Bools:
@@ -72,6 +96,10 @@ class Frames:
         return self.crc_ok
 
 
+COLUMNS = tuple(Frames.__annotations__)
+"""Names of the columns."""
+
+
 def join(parts: list[Frames]) -> Frames:
     """Return all frames of `parts`, one after the other."""
-    return Frames(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Frames)))
+    return Frames(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in COLUMNS})

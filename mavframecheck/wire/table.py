@@ -67,7 +67,7 @@ class Table:
 
     def compact(self) -> Table:
         """Return the same rows without holding on to the rest of their batch."""
-        return Table(self.layout, self.frames, np.arange(len(self)), self.columns)
+        return Table(self.layout, self.frames.own(), np.arange(len(self)), self.columns)
 
 
 def join(parts: list[Table]) -> Table:

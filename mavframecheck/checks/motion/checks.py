@@ -11,6 +11,7 @@ import numpy as np
 from mavframecheck.checks.base import Check, Observation, Place, Verdict
 from mavframecheck.checks.motion import attitude, axes, twist
 from mavframecheck.checks.motion import judge as judging
+from mavframecheck.checks.motion.setpoints import OrderOfSetpoints
 from mavframecheck.model import Scalar
 from mavframecheck.model import Subject as Whom
 from mavframecheck.vehicle import Context
@@ -281,10 +282,32 @@ class EulerSwapped(_Poses):
 
 
 class QuaternionOrder(_Poses):
-    """Quaternions in another order of elements."""
+    """Quaternions in another order of elements: in poses, and in attitude setpoints."""
 
     lies = ("order",)
     rotation = True
+
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
+        """Listen with nothing heard so far."""
+        super().__init__(params, dialect)
+        self._setpoints = OrderOfSetpoints()
+
+    def update(self, batch: Batch, context: Context) -> None:
+        """Take in poses and setpoints."""
+        super().update(batch, context)
+        self._setpoints.update(batch, context)
+
+    def finish(self) -> Iterable[Observation]:
+        """Return what was found in either."""
+        yield from super().finish()
+        yield from self._setpoints.found()
+
+    def verdict(self) -> Verdict:
+        """Return the rows that could be told."""
+        poses = super().verdict()
+        if self._setpoints.rows:
+            return Verdict(poses.checked + self._setpoints.rows)
+        return poses
 
 
 class BodyAxes(MotionCheck):
