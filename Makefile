@@ -40,8 +40,9 @@ samples: $(READY)  ## write samples/ again
 bench: $(READY)  ## speed and memory against the required figures (about five minutes)
 	$(BIN)/python -m benchmarks.bench --corpus $(CORPUS)
 
-accuracy: $(READY)  ## found, missed and false alarms on the labelled recordings
+accuracy: $(READY)  ## labelled recordings: found, missed, false alarms; real ones: confirmed or not
 	$(BIN)/python -m benchmarks.accuracy --corpus $(CORPUS)
+	$(BIN)/python -m benchmarks.adjudicated --corpus $(CORPUS)
 
 injection: $(READY)  ## mistakes written into clean recordings: which are found (about four minutes)
 	$(BIN)/python -m benchmarks.injection --corpus $(CORPUS) $(if $(ONLY),--only $(ONLY))
