@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import struct
 from collections.abc import Iterable, Sequence
-from dataclasses import fields
 from typing import Any, NamedTuple
 
 from hypothesis import strategies as st
@@ -13,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mavframecheck.model import Damage
 from mavframecheck.wire import Batch, Chunk, Frames, load_dialect, read_batches, whole
-from mavframecheck.wire.frames import join
+from mavframecheck.wire.frames import COLUMNS, join
 
 DIALECT = load_dialect()
 MESSAGES: dict[int, Any] = dict(mavlink.mavlink_map)
@@ -153,7 +152,7 @@ def read_chunks(groups: list[list[Chunk]], *, stamped: bool) -> Reading:
 
 def described(frames: Frames) -> list[tuple[Any, ...]]:
     """Return all that is said of frames, save where they lie in the buffer of their batch."""
-    names = [f.name for f in fields(Frames) if f.name not in {"start", "payload"}]
+    names = [name for name in COLUMNS if name not in {"start", "payload"}]
     return list(zip(*(getattr(frames, name).tolist() for name in names)))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -58,7 +58,10 @@ class Found:
             self.hits += len(rows)
 
 
-class _PoseCheck(Check):
+State = TypeVar("State", bound=Found)
+
+
+class _PoseCheck(Check, Generic[State]):
     """Follows the poses that are sent to a vehicle; what autopilots send is none."""
 
     messages: tuple[str, ...] = POSES
@@ -66,7 +69,7 @@ class _PoseCheck(Check):
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no stream yet."""
         super().__init__(params, dialect)
-        self._streams: dict[Key, Found] = {}
+        self._streams: dict[Key, State] = {}
 
     def update(self, batch: Batch, context: Context) -> None:
         """Follow every stream through the batch."""
@@ -79,12 +82,12 @@ class _PoseCheck(Check):
             found.rows += len(table)
             self.follow(found, table, context)
 
-    def begin(self) -> Found:
+    @abstractmethod
+    def begin(self) -> State:
         """Return the state of a new stream."""
-        return Found()
 
     @abstractmethod
-    def follow(self, found: Found, table: Table, context: Context) -> None:
+    def follow(self, found: State, table: Table, context: Context) -> None:
         """Judge further rows of a stream."""
 
     def finish(self) -> Iterable[Observation]:
@@ -100,7 +103,9 @@ class _PoseCheck(Check):
         return Verdict(sum(found.rows for found in self._streams.values()))
 
 
-def _poses(batch: Batch, context: Context, messages: tuple[str, ...]) -> Iterator[tuple[Key, Table]]:
+def _poses(
+    batch: Batch, context: Context, messages: tuple[str, ...]
+) -> Iterator[tuple[Key, Table]]:
     for message in messages:
         table = batch.tables.get(message)
         if table is None:
@@ -120,10 +125,14 @@ def _xyz(table: Table) -> Floats:
     return np.column_stack([table[name].astype(np.float64) for name in ("x", "y", "z")])
 
 
-class UnsignalledReset(_PoseCheck):
+class UnsignalledReset(_PoseCheck[Found]):
     """Steps that are no motion, with the reset counter as before."""
 
     messages = COUNTED
+
+    def begin(self) -> Found:
+        """Return the state of a new stream."""
+        return Found()
 
     def follow(self, found: Found, table: Table, _context: Context) -> None:
         """Look at each step beside the one before and the one after it."""
@@ -183,18 +192,17 @@ class _Counting(Found):
     changes: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
-class RunningResetCounter(_PoseCheck):
+class RunningResetCounter(_PoseCheck[_Counting]):
     """Counters that go up once a second and more, for long."""
 
     messages = COUNTED
 
-    def begin(self) -> Found:
+    def begin(self) -> _Counting:
         """Return the state of a new stream."""
         return _Counting()
 
-    def follow(self, found: Found, table: Table, _context: Context) -> None:
+    def follow(self, found: _Counting, table: Table, _context: Context) -> None:
         """Note when the counter goes up, and how many times it did in a row of seconds."""
-        assert isinstance(found, _Counting)
         table = table.take(table.frames.t_valid)
         if not len(table):
             return
@@ -210,7 +218,10 @@ class RunningResetCounter(_PoseCheck):
         found.changes = times[-many:]
         found.hit(table, up[running])
         if running.any():
-            found.values = {"changes": int(self.params["min_changes"]), "within_s": self.params["within_s"]}
+            found.values = {
+                "changes": int(self.params["min_changes"]),
+                "within_s": self.params["within_s"],
+            }
 
 
 @dataclass(slots=True)
@@ -225,19 +236,19 @@ class _Standing(Found):
     lon: float = np.nan
 
 
-class FrozenPose(_PoseCheck):
+class FrozenPose(_PoseCheck[_Standing]):
     """Positions that stay the same to the last digit while the vehicle goes somewhere else."""
 
-    def begin(self) -> Found:
+    def begin(self) -> _Standing:
         """Return the state of a new stream."""
         return _Standing()
 
-    def follow(self, found: Found, table: Table, context: Context) -> None:
+    def follow(self, found: _Standing, table: Table, context: Context) -> None:
         """Judge every row by how long its position stood, and where the vehicle was at the beginning."""
-        assert isinstance(found, _Standing)
         pose = _xyz(table)
         lat, lon = (
-            context.lookup(name, table, late=False).values for name in ("vehicle.lat", "vehicle.lon")
+            context.lookup(name, table, late=False).values
+            for name in ("vehicle.lat", "vehicle.lon")
         )
         before = pose[:1] + 1 if found.pose is None else found.pose[np.newaxis]
         fresh = np.any(pose != np.concatenate((before, pose[:-1])), axis=1)

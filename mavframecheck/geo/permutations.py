@@ -38,7 +38,10 @@ def signed_permutations() -> Floats:
 
 PERMUTATIONS = signed_permutations()
 QUARTER_TURNS: Floats = np.array(
-    [[[c, -s, 0], [s, c, 0], [0, 0, 1]] for c, s in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))]
+    [
+        [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+        for c, s in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+    ]
 )
 """(4, 3, 3) turns about the vertical by 0, 90, 180 and 270 degrees."""
 

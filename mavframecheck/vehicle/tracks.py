@@ -271,7 +271,7 @@ class Tracks:
         bins = np.maximum(since // BIN_US, 0)
         while int(bins.max()) // WINDOW_BINS >> self._level >= MAX_WINDOWS:
             self._level += 1
-        track.add(table, bins, since * 1e-6)
+        track.add(table, bins, np.asarray(since * 1e-6, np.float64))
 
 
 def _number(table: Table) -> int:

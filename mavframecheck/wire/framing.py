@@ -320,7 +320,11 @@ class _Walk:
                 self._skip_to(unsettled - self.gap, reason)
                 self.lost = reason
                 return False
-        self._skip_to(self.size if target is None else target - self.gap, reason)
+        if target is None:
+            self._skip_to(self.size, reason)
+        else:
+            stamp = target - self.gap
+            self._skip_to(stamp if stamp >= self.done else target, reason)
         return target is not None and self._accept(np.array([self._at(target)]))
 
     def _next_good(self, position: int) -> int | None:

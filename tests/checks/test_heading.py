@@ -18,7 +18,9 @@ from mavframecheck.wire.encode import encode_frame, encode_payload, stamped
 RULE = Path(__file__).parents[2] / "rules" / "units" / "MFC309-heading-scale.toml"
 
 
-def judged(scale: float, turn_deg: float, rows: int = 200) -> tuple[FileReport, tuple[Finding, ...]]:
+def judged(
+    scale: float, turn_deg: float, rows: int = 200
+) -> tuple[FileReport, tuple[Finding, ...]]:
     """Judge a vehicle that turns by `turn_deg`, its `hdg` being its yaw in degrees times `scale`."""
     dialect = load_dialect()
     data = bytearray()

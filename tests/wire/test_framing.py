@@ -232,6 +232,15 @@ class TestWhatIsRead:
         assert frames.seq.tolist() == [0, 1, 90, 2, 3]
         assert not frames.t_valid[2]
 
+    def test_a_torn_stamp_before_a_good_frame(self) -> None:
+        """What is left of the stamp is damage; the frame is kept, without a time."""
+        good = in_order(3, stamped=True)
+        stream = good[0] + b"\x07\xa6" + attitude(90) + good[1]
+        reading = read([stream], stamped=True)
+        assert reading.frames.seq.tolist() == [0, 90, 1]
+        assert reading.frames.t_valid.tolist() == [True, False, True]
+        assert [(d.offset, d.length) for d in reading.damage] == [(len(good[0]), 2)]
+
     @both
     def test_wrong_length(self, stamped: bool) -> None:
         """A length that leads astray costs its own frame."""

@@ -37,7 +37,9 @@ class Reading(NamedTuple):
     free_yaw: bool = False
 
 
-def _euler(change: Callable[[Floats, Floats, Floats], tuple[Floats, Floats, Floats]]) -> Callable[[Floats], Floats]:
+def _euler(
+    change: Callable[[Floats, Floats, Floats], tuple[Floats, Floats, Floats]],
+) -> Callable[[Floats], Floats]:
     def of(q: Floats) -> Floats:
         return q4.quaternion_from_euler(*change(*q4.euler_from_quaternion(q).T))
 
@@ -65,13 +67,19 @@ READINGS = (
     ),
     Reading("order", "its elements are x, y, z, w", lambda q: q[:, [1, 2, 3, 0]]),
     Reading("inverse", "it is the inverse (from the world to the body)", q4.inverse),
-    Reading(
-        "swapped", "roll and pitch have changed places", _euler(lambda r, p, y: (p, r, y))
-    ),
+    Reading("swapped", "roll and pitch have changed places", _euler(lambda r, p, y: (p, r, y))),
     Reading("body", "pitch has the wrong sign", _euler(lambda r, p, y: (r, -p, y))),
     Reading("body", "roll has the wrong sign", _euler(lambda r, p, y: (-r, p, y))),
-    Reading("body", "pitch and yaw have the wrong sign, as in north-west-up with front-left-up axes", lambda q: q4.product(_FLU, q4.product(q, _FLU))),
-    Reading("body", "it is of east-north-up with front-left-up axes", lambda q: q4.product(_ENU, q4.product(q, _FLU))),
+    Reading(
+        "body",
+        "pitch and yaw have the wrong sign, as in north-west-up with front-left-up axes",
+        lambda q: q4.product(_FLU, q4.product(q, _FLU)),
+    ),
+    Reading(
+        "body",
+        "it is of east-north-up with front-left-up axes",
+        lambda q: q4.product(_ENU, q4.product(q, _FLU)),
+    ),
     Reading("frames", "it is of front-left-up axes", lambda q: q4.product(q, _FLU)),
     Reading("frames", "it is in east-north-up", lambda q: q4.product(_ENU, q)),
     Reading("frames", "it is in north-west-up", lambda q: q4.product(_FLU, q)),
@@ -114,7 +122,9 @@ def compare(
         both = np.isfinite(mine).all(axis=1) & np.isfinite(theirs).all(axis=1)
         if np.count_nonzero(both) < 2 * MIN_TELLING:
             continue
-        reads = [_read(each, mine[both], theirs[both], free_heading=free_heading) for each in READINGS]
+        reads = [
+            _read(each, mine[both], theirs[both], free_heading=free_heading) for each in READINGS
+        ]
         least = min(read.mean for read in reads)
         if best is None or least < best[0]:
             best = least, delay, reads

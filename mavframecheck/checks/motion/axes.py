@@ -24,8 +24,15 @@ SPANS_S = (1.0, 4.0)
 """Displacements are taken over the first of these, s, over which the vehicle moved enough."""
 GRID_S = 0.1
 """Times at which they are compared lie at least this far apart, s."""
+MAX_TIMES = 1500
+"""At most so many times are compared, spread over all that is kept."""
+SAMPLE_S = 0.05
+"""Samples of a track are no nearer to each other, s."""
 DELAYS_S: Floats = np.arange(-0.5, 2.01, 0.05)
-"""Delays that are tried, s."""
+"""Delays that are tried, s: every `_COARSE`-th, then all around the best one."""
+_COARSE = 4
+_SHARP = 6
+"""A delay is known where no more than so many explain the motion about as well."""
 MIN_MOVED_M = 0.15
 """Along a direction that is judged: root mean square of the displacements, m."""
 MIN_STEP_M = 0.3
@@ -103,15 +110,17 @@ class _Steps(NamedTuple):
     stream: Floats
     reference: Floats
     at: Floats
+    grid_s: float
     span_s: float
     delay_s: float
-    explained: Floats
-    """(delays,) how well each delay explains them."""
+    explained: float
+    """Share of the stream's motion that follows the reference with this delay."""
+    delay_known: bool = False
 
     @property
     def independent(self) -> float:
         """How many displacements do not overlap."""
-        return max(1.0, len(self.at) * GRID_S / self.span_s)
+        return max(1.0, len(self.at) * min(self.grid_s / self.span_s, 1.0))
 
 
 def compare(stream: Series, reference: Series, frame: Frame) -> Fit | Undecided:
@@ -127,34 +136,45 @@ def compare(stream: Series, reference: Series, frame: Frame) -> Fit | Undecided:
 
 
 def _steps(stream: Series, reference: Series, span_s: float) -> _Steps | Undecided:
-    at = _grid(stream.t)
+    at, grid_s = grid(stream.t)
     moved = stream.steps(at, span_s)
-    best, explained = None, np.full(len(DELAYS_S), -np.inf)
-    for k, delay_s in enumerate(DELAYS_S.tolist()):
-        went = reference.steps(at - delay_s, span_s)
-        both, rows, there = _moving(moved, went)
-        if np.count_nonzero(there) * GRID_S < MIN_SECONDS:
-            continue
-        explained[k] = _explained(rows[0], rows[1])
-        if best is None or explained[k] > explained[best[0]]:
-            best = (k, delay_s, rows, at[both][there])
-    if best is None:
+    tried: dict[int, _Steps] = {}
+
+    def attempt(places: range) -> int | None:
+        """Try delays by their place in `DELAYS_S`; return the one that explains most so far."""
+        for k in places:
+            if 0 <= k < len(DELAYS_S) and k not in tried:
+                went = reference.steps(at - DELAYS_S[k], span_s)
+                both, rows, there = _moving(moved, went)
+                if np.count_nonzero(there) * grid_s >= MIN_SECONDS:
+                    times, share = at[both][there], _explained(*rows)
+                    tried[k] = _Steps(*rows, times, grid_s, span_s, float(DELAYS_S[k]), share)
+        return max(tried, key=lambda k: tried[k].explained, default=None)
+
+    near = attempt(range(0, len(DELAYS_S), _COARSE))
+    if near is None:
         return Undecided("the vehicle hardly moves while both are heard")
-    k, delay_s, rows, times = best
-    return _Steps(rows[0], rows[1], times, span_s, delay_s, explained)
+    best = attempt(range(near - _COARSE, near + _COARSE + 1))
+    while best is not None and best != near:
+        near, best = best, attempt(range(best - 2, best + 3))
+    found = tried[near]
+    shares = np.array([each.explained for each in tried.values()])
+    flat = np.count_nonzero(shares > found.explained - 0.3 * (1 - found.explained) - 0.002)
+    return found._replace(delay_known=bool(flat <= _SHARP))
 
 
-def _grid(t: Floats) -> Floats:
-    """Return the times of samples, thinned."""
-    places = np.floor(t / GRID_S)
-    return t[np.diff(places, prepend=-np.inf) > 0]
+def grid(t: Floats) -> tuple[Floats, float]:
+    """Return the times of samples, thinned evenly, and how far apart they are at the least, s."""
+    grid_s = max(GRID_S, len(t) * SAMPLE_S / MAX_TIMES)
+    places = np.floor(t / grid_s)
+    return t[np.diff(places, prepend=-np.inf) > 0], grid_s
 
 
 def _moving(moved: Floats, went: Floats) -> tuple[Bools, tuple[Floats, Floats], Bools]:
     """Return (n,) where both are known, the displacements where either is moving, and which those are."""
-    both = np.isfinite(moved).all(axis=1) & np.isfinite(went[:, :2]).all(axis=1)
+    both: Bools = np.asarray(np.isfinite(moved).all(axis=1) & np.isfinite(went[:, :2]).all(axis=1))
     a, b = moved[both], np.nan_to_num(went[both])
-    there = np.linalg.norm(b, axis=1) > MIN_STEP_M
+    there: Bools = np.asarray(np.linalg.norm(b, axis=1) > MIN_STEP_M)
     return both, (a[there], b[there]), there
 
 
@@ -218,8 +238,6 @@ def _conclude(steps: _Steps, frame: Frame, seen: _Directions, scale: float) -> F
         turned = frame.axes @ yaw_matrix(yaw)
         if _left(steps, turned, scale) < 0.7 * _left(steps, expected, scale):
             kind, matrix = "turned", turned
-    peak = steps.explained.max()
-    sharp = np.count_nonzero(steps.explained > peak - 0.3 * (1 - peak) - 0.002) <= 6
     return Fit(
         kind,
         matrix,
@@ -231,7 +249,7 @@ def _conclude(steps: _Steps, frame: Frame, seen: _Directions, scale: float) -> F
         _left(steps, expected, scale),
         scale,
         steps.delay_s,
-        bool(sharp),
+        steps.delay_known,
         float(np.linalg.norm(steps.reference, axis=1).mean() * steps.independent),
         float(np.linalg.norm(steps.reference, axis=1).mean()),
         steps.span_s,
@@ -270,9 +288,9 @@ def _other(
     best = turned[int(np.argmin([_left(steps, matrix, scale) for matrix in turned]))]
     if seen.off(best) > FITS or not yaw_known:
         return "undecided", best, "", ""
-    if np.allclose(np.abs(best[2]), [0, 0, 1]) and np.allclose(best[2], frame.axes[2]):
-        if np.linalg.det(best) * np.linalg.det(frame.axes) > 0:
-            return "turned", best, "", ""
+    proper = np.linalg.det(best) * np.linalg.det(frame.axes) > 0
+    if proper and np.allclose(best[2], frame.axes[2]):
+        return "turned", best, "", ""
     return _freely(frame, best)
 
 

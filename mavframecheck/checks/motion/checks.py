@@ -142,7 +142,9 @@ def _named(fit: axes.Fit, fields: tuple[str, str, str]) -> Values:
     says = fit.says
     for axis, name in zip("xyz", fields, strict=True):
         says = says.replace(f"{axis} holds", f"{name} holds").replace(f"{axis} is ", f"{name} is ")
-        says = says.replace(f"{axis} points", f"{name} points").replace(f"of {axis},", f"of {name},")
+        says = says.replace(f"{axis} points", f"{name} points").replace(
+            f"of {axis},", f"of {name},"
+        )
     return {"says": says, "down_field": fields[2]}
 
 
@@ -252,7 +254,11 @@ class QuarterTurn(MotionCheck):
         place, lie = subject.place, subject.lie
         if isinstance(place, axes.Fit) and place.kind in ("turned", "quarter"):
             values = {**fit_values(place), "what": "frame"}
-        elif isinstance(lie, attitude.Lie) and lie.kind == "yaw_offset" and not in_other_axes(subject):
+        elif (
+            isinstance(lie, attitude.Lie)
+            and lie.kind == "yaw_offset"
+            and not in_other_axes(subject)
+        ):
             values = {**lie_values(lie), "what": "yaw"}
         else:
             return None
@@ -326,9 +332,9 @@ class BodyAxes(MotionCheck):
     def told(self, subject: judging.Subject) -> Values | None:
         """Return which reading fits."""
         lie, turn = subject.lie, subject.twist
-        if isinstance(lie, attitude.Lie) and lie.kind == "body" and _euler(subject):
-            if not in_other_axes(subject):
-                return {**lie_values(lie), "what": "attitude"}
+        angles = _euler(subject) and not in_other_axes(subject)
+        if angles and isinstance(lie, attitude.Lie) and lie.kind == "body":
+            return {**lie_values(lie), "what": "attitude"}
         if isinstance(turn, twist.Twist) and turn.kind == "flu":
             return {**twist_values(turn), "what": "velocity"}
         return None
@@ -390,10 +396,16 @@ class EstimateScale(MotionCheck):
         """Return what was missing to tell."""
         if isinstance(subject.place, str):
             return subject.place
-        return "" if self._sure(subject.place) else f"less than {self.params['min_track_m']:.0f} m of track"
+        return (
+            ""
+            if self._sure(subject.place)
+            else f"less than {self.params['min_track_m']:.0f} m of track"
+        )
 
     def _sure(self, fit: axes.Fit) -> bool:
-        per_step = fit.track_m and fit.residual_m <= self.params["max_residual_share"] * _step_m(fit)
+        per_step = fit.track_m and fit.residual_m <= self.params["max_residual_share"] * _step_m(
+            fit
+        )
         return fit.track_m >= self.params["min_track_m"] and bool(per_step)
 
     def told(self, subject: judging.Subject) -> Values | None:

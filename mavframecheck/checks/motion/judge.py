@@ -33,7 +33,13 @@ POSES = (
     "ODOMETRY",
     "LOCAL_POSITION_NED",
 )
-VELOCITIES = ("VISION_SPEED_ESTIMATE", "GPS_INPUT", "HIL_GPS", "GLOBAL_POSITION_INT", "LOCAL_POSITION_NED")
+VELOCITIES = (
+    "VISION_SPEED_ESTIMATE",
+    "GPS_INPUT",
+    "HIL_GPS",
+    "GLOBAL_POSITION_INT",
+    "LOCAL_POSITION_NED",
+)
 _PARAMETERS = (b"EK3_SRC1_POSXY", b"EK3_SRC1_POSZ", b"EK3_SRC1_YAW", b"EKF2_EV_CTRL", b"VISO_TYPE")
 _ALIGNING = (2, 3)
 """VISO_TYPE of cameras whose heading ArduPilot aligns itself."""
@@ -95,9 +101,8 @@ _JUDGES: weakref.WeakKeyDictionary[Context, Judge] = weakref.WeakKeyDictionary()
 class Judge:
     """The streams of one recording."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self) -> None:
         """Listen with nothing heard so far."""
-        self._context = weakref.ref(context)
         self._tracks = Tracks()
         self._batch: weakref.ref[Batch] | None = None
         self.parameters: dict[tuple[int, bytes], float] = {}
@@ -106,7 +111,7 @@ class Judge:
     @staticmethod
     def of(context: Context) -> Judge:
         """Return the judge that all rules of a recording share."""
-        return _JUDGES.setdefault(context, Judge(context))
+        return _JUDGES.setdefault(context, Judge())
 
     def update(self, batch: Batch, context: Context) -> None:
         """Take in a batch, once."""
@@ -175,7 +180,10 @@ class Judge:
     def _frame_of(self, track: Track, system: int) -> axes.Frame | None:
         if track.key.message == "ODOMETRY":
             return frames().get(track.key.variant[0])
-        if self.parameters.get((system, b"VISO_TYPE")) in _ALIGNING and track.key.message == POSES[0]:
+        if (
+            self.parameters.get((system, b"VISO_TYPE")) in _ALIGNING
+            and track.key.message == POSES[0]
+        ):
             return frames()[_frame("LOCAL_FRD")]
         return axes.NED
 

@@ -40,6 +40,10 @@ class _Stream:
     hits: int = 0
     left: float = 0.0
     labelled: float = 0.0
+    """The largest differences from the vehicle while it reads better the other way, rad."""
+    run_left: float = 0.0
+    run_labelled: float = 0.0
+    """The same of the run that is not over."""
 
 
 class OrderOfSetpoints:
@@ -81,13 +85,16 @@ class OrderOfSetpoints:
         for start, stop in _runs(wrong):
             if start or not stream.run:
                 stream.run, stream.begun = 0, place(table.frames, int(rows[start]))
+                stream.run_left = stream.run_labelled = 0.0
             before, stream.run = stream.run, stream.run + stop - start
+            stream.run_left = max(stream.run_left, float(left[start:stop].max()))
+            stream.run_labelled = max(stream.run_labelled, float(labelled[start:stop].max()))
             if stream.run >= IN_ROW:
                 stream.first = stream.first or stream.begun
                 stream.last = place(table.frames, int(rows[stop - 1]))
                 stream.hits += stop - start + (before if before < IN_ROW else 0)
-                stream.left = max(stream.left, float(left[start:stop].max()))
-                stream.labelled = max(stream.labelled, float(labelled[start:stop].max()))
+                stream.left = max(stream.left, stream.run_left)
+                stream.labelled = max(stream.labelled, stream.run_labelled)
         if not wrong[-1]:
             stream.run = 0
 
