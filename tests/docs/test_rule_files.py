@@ -26,7 +26,7 @@ CODE = set(re.findall(r"`([^`\n]+)`", PAGE))
 CALLED = {call for code in CODE for call in re.findall(r"^(\w+)(?:$|\()", code)}
 TABLES = re.findall(r"`\[\[?(\w+)\]\]?`", PAGE)
 WORKED = re.search(r"```toml\n(code = .*?)```", PAGE, re.DOTALL)
-OWN_SYNTAX = {"known", "stack", "listed"}
+OWN_SYNTAX = {"known", "maybe", "stack", "listed"}
 """Functions that the compiler knows itself."""
 
 
