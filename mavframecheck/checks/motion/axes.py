@@ -126,6 +126,8 @@ class _Steps(NamedTuple):
 def compare(stream: Series, reference: Series, frame: Frame) -> Fit | Undecided:
     """Say how the displacements of `stream` lie against those of `reference`, which are NED."""
     why = "the vehicle hardly moves"
+    if not _moves(reference):
+        return Undecided(why)
     for span_s in SPANS_S:
         steps = _steps(stream, reference, span_s)
         if isinstance(steps, Undecided):
@@ -133,6 +135,14 @@ def compare(stream: Series, reference: Series, frame: Frame) -> Fit | Undecided:
             continue
         return _judge(steps, frame)
     return Undecided(why)
+
+
+def _moves(reference: Series) -> bool:
+    """Return whether the vehicle moves at all: most recordings of a bench end here."""
+    at, grid_s = grid(reference.t)
+    went = np.nan_to_num(reference.steps(at, SPANS_S[-1]))
+    there = np.linalg.norm(went, axis=1) > MIN_STEP_M
+    return bool(np.count_nonzero(there) * grid_s >= MIN_SECONDS / 2)
 
 
 def _steps(stream: Series, reference: Series, span_s: float) -> _Steps | Undecided:

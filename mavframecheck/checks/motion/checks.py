@@ -253,7 +253,8 @@ class QuarterTurn(MotionCheck):
         """Return by how much the heading is off."""
         place, lie = subject.place, subject.lie
         if isinstance(place, axes.Fit) and place.kind in ("turned", "quarter"):
-            values = {**fit_values(place), "what": "frame"}
+            points = float(np.degrees(-place.yaw))  # where x points, seen from north
+            values = {**fit_values(place), "what": "frame", "yaw_deg": points}
         elif (
             isinstance(lie, attitude.Lie)
             and lie.kind == "yaw_offset"
@@ -265,7 +266,9 @@ class QuarterTurn(MotionCheck):
         off = abs(float(values["yaw_deg"] or 0.0))
         is_quarter = quarter(off, self.params["quarter_tolerance_deg"])
         enough = off >= self.params["min_yaw_deg"]
-        return values if enough and is_quarter == self.quarters else None
+        if not enough or is_quarter != self.quarters or self._judge is None:
+            return None
+        return {**values, "may_be_aligned": self._judge.may_align(subject)}
 
 
 class Unaligned(QuarterTurn):

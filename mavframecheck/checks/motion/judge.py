@@ -187,6 +187,12 @@ class Judge:
             return frames()[_frame("LOCAL_FRD")]
         return axes.NED
 
+    def may_align(self, subject: Subject) -> bool:
+        """Return whether the autopilot may turn the heading of a stream itself: no parameter tells."""
+        told = {name for system, name in self.parameters if system == subject.system}
+        told &= {b"VISO_TYPE", b"EKF2_EV_CTRL"}
+        return subject.track.key.message == POSES[0] and not told
+
     def _series(self, track: Track) -> Series:
         if track.key not in self._cache:
             self._cache[track.key] = series_of(track)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +32,7 @@ RESET_TIMES = 8.0
 """... and so many times further than from sample to sample elsewhere, jumped."""
 
 
-@dataclass(slots=True)
+@dataclass
 class Series:
     """Samples of one stream; positions NED (or what the stream takes for it), attitudes `ned_from_frd`."""
 
@@ -49,8 +50,17 @@ class Series:
 
     def places(self, at: Floats) -> Floats:
         """Return (k, 3) positions at times `at`, NaN across gaps and resets."""
+        t, place, torn = self._track
+        return _between(t, place, at, torn)
+
+    @functools.cached_property
+    def _track(self) -> tuple[Floats, Floats, Bools]:
+        """Times and positions that are known, those behind each reset far away, and where resets are."""
         given = np.isfinite(self.place[:, :2]).all(axis=1)
-        return _between(self.t[given], self.place[given], at, _resets(self.place[given]))
+        place = self.place[given]
+        torn = _resets(place)
+        behind = np.concatenate(([0.0], np.cumsum(torn)))[: len(place)] * APART_M
+        return self.t[given], place + behind[:, np.newaxis], torn
 
     def velocities(self, at: Floats) -> Floats:
         """Return (k, 3) velocities at times `at`, NaN across gaps."""
@@ -97,7 +107,6 @@ def _between(t: Floats, values: Floats, at: Floats, torn: Bools | None = None) -
         return np.full((len(at), values.shape[1]), np.nan)
     k, share, near = _places_in(t, at)
     if torn is not None:
-        values = values + (np.concatenate(([0.0], np.cumsum(torn))) * APART_M)[:, np.newaxis]
         near &= ~torn[k]
     found = values[k] + share[:, np.newaxis] * (values[k + 1] - values[k])
     return np.where(near[:, np.newaxis], found, np.nan)
