@@ -38,15 +38,18 @@ class CompiledRule:
         params: Mapping[str, Any],
         source: str,
         binds: Collection[str] | None = None,
+        speaks_of: Collection[str] | None = None,
     ) -> None:
         """Take `rule` from the file `source` with `params` in place of its own.
 
-        `binds` are the messages that it can be about, where that was worked out before.
+        `binds` are the messages that it can be about, and `speaks_of` the context that it names, where
+        that was worked out before.
         """
         self.rule = rule
         self.params = {**rule.params, **params}
         self._source = source
         self._binds = binds
+        self._known_to_speak_of = speaks_of
         self.messages = Choice(rule.applies.message)
         self.criteria = [(name, Choice(value)) for name, value in rule.applies.tag.items()]
         self.senders = Choice(rule.applies.sender)
@@ -148,15 +151,18 @@ class CompiledRule:
     @functools.cached_property
     def awaited(self) -> frozenset[str]:
         """Context worth waiting for: what judging, severity and words speak of."""
-        return frozenset(name for name in self._spoken_of if NAMES[name].waits)
+        return frozenset(name for name in self.spoken_of if NAMES[name].waits)
 
     @functools.cached_property
     def asked_at_once(self) -> frozenset[str]:
         """Context that is not worth waiting for: as it is known when a row comes, however long that waits."""
-        return self._spoken_of - self.awaited
+        return self.spoken_of - self.awaited
 
     @functools.cached_property
-    def _spoken_of(self) -> frozenset[str]:
+    def spoken_of(self) -> frozenset[str]:
+        """All context that judging, severity and words name."""
+        if self._known_to_speak_of is not None:
+            return frozenset(self._known_to_speak_of)
         spoken = [condition for condition, _ in self.severities]
         for template in (self.text, self.fix, *self.evidence.values()):
             spoken += template.expressions
@@ -308,6 +314,8 @@ class Pack(msgspec.Struct, frozen=True):
     sources: dict[str, str] = {}
     binds: dict[str, tuple[str, ...]] = {}
     """Code to the messages that the rule can be about, worked out when the pack was compiled."""
+    context: dict[str, tuple[str, ...]] = {}
+    """Code to the context that the rule names, worked out then too."""
 
     @property
     def by_code(self) -> dict[str, Rule]:

@@ -29,7 +29,7 @@ def load_pack(directories: Sequence[Path] = ()) -> Pack:
     if not own:
         return shipped
     pack = _pack([*((rule, shipped.sources[rule.code]) for rule in shipped.rules), *own])
-    return msgspec.structs.replace(pack, binds=shipped.binds)
+    return msgspec.structs.replace(pack, binds=shipped.binds, context=shipped.context)
 
 
 def source_folder() -> Path:
@@ -72,6 +72,7 @@ def compile_rule(
     params: dict[str, float | str | bool],
     source: str,
     binds: Collection[str] | None = None,
+    speaks_of: Collection[str] | None = None,
 ) -> CompiledRule:
     """Return `rule` ready to run; RuleFileError when it has no, or two, ways to detect."""
     if bool(rule.detect.flag) == bool(rule.detect.check):
@@ -86,7 +87,7 @@ def compile_rule(
     elif not (rule.applies.message or rule.applies.tag):
         message = f"{source}: applies needs message or tag"
         raise RuleFileError(message)
-    return CompiledRule(rule, params, source, binds)
+    return CompiledRule(rule, params, source, binds, speaks_of)
 
 
 def chosen_rules(pack: Pack, settings: Settings) -> list[CompiledRule]:
@@ -97,6 +98,7 @@ def chosen_rules(pack: Pack, settings: Settings) -> list[CompiledRule]:
             settings.overrides.get(rule.code, {}),
             pack.sources[rule.code],
             pack.binds.get(rule.code),
+            pack.context.get(rule.code),
         )
         for rule in pack.rules
         if _runs(rule, settings)
@@ -115,12 +117,15 @@ def compiled_pack() -> bytes:
     folder = source_folder()
     read = [read_rule(file) for file in rule_files(folder)]
     pack = _pack((rule, Path(file).relative_to(folder).as_posix()) for rule, file in read)
-    binds = {rule.code: bound_messages(compile_rule(rule, {}, "")) for rule in pack.rules}
+    compiled = [compile_rule(rule, {}, "") for rule in pack.rules]
+    found = {
+        "sources": pack.sources,
+        "binds": {each.rule.code: bound_messages(each) for each in compiled},
+        "context": {each.rule.code: sorted(each.spoken_of) for each in compiled},
+    }
     rules = b",\n".join(msgspec.json.encode(rule) for rule in pack.rules)
-    sources, messages = (msgspec.json.encode(d, order="sorted") for d in (pack.sources, binds))
-    return (
-        b'{"rules":[\n' + rules + b'\n],"sources":' + sources + b',\n"binds":' + messages + b"}\n"
-    )
+    rest = [b'"%s":%s' % (key.encode(), msgspec.json.encode(value)) for key, value in found.items()]
+    return b'{"rules":[\n' + rules + b"\n],\n" + b",\n".join(rest) + b"}\n"
 
 
 def _pack(rules: Iterable[tuple[Rule, str]]) -> Pack:

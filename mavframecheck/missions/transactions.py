@@ -7,6 +7,7 @@ that is sent again replaces the first one. Source: MAVLink developer guide, Miss
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -51,7 +52,16 @@ class Mission:
 class _Open:
     count: int
     parts: list[Items] = field(default_factory=list)
+    rows: list[tuple[Table, int]] = field(default_factory=list)
+    """Items of the current batch, in order."""
     kept: int = 0
+
+    def settle(self) -> None:
+        """Turn the items of the current batch into columns that do not hold on to it."""
+        for table, rows in itertools.groupby(self.rows, key=lambda entry: entry[0]):
+            picked = np.array([row for _, row in rows])
+            self.parts.append(items_of(table.take(picked).compact()))
+        self.rows.clear()
 
 
 class Transactions:
@@ -70,6 +80,8 @@ class Transactions:
                 yield from self._end(table, row)
             else:
                 self._add(table, row)
+        for transaction in self._open.values():
+            transaction.settle()
 
     def finish(self) -> Iterator[Mission]:
         """Yield the missions whose transaction never ended."""
@@ -85,7 +97,7 @@ class Transactions:
     def _add(self, table: Table, row: int) -> None:
         transaction = self._open.get(_key(table, row))
         if transaction is not None and transaction.kept < MAX_ITEMS:
-            transaction.parts.append(items_of(table.take(np.array([row])).compact()))
+            transaction.rows.append((table, row))
             transaction.kept += 1
 
     def _end(self, table: Table, row: int) -> Iterator[Mission]:
@@ -98,7 +110,8 @@ class Transactions:
 
     def _close(self, key: Key, answer: int | None) -> Iterator[Mission]:
         transaction = self._open.pop(key, None)
-        if transaction is not None and transaction.parts:
+        if transaction is not None and transaction.kept:
+            transaction.settle()
             items = join(transaction.parts)
             backwards = items.seq[::-1]
             last = len(items) - 1 - np.unique(backwards, return_index=True)[1]

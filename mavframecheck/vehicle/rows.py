@@ -24,6 +24,8 @@ from mavframecheck.wire.table import join as join_tables
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
 T = TypeVar("T")
+FEW = 12
+"""Up to this many values, comparing with each is faster than looking them up."""
 
 
 class Rows:
@@ -105,8 +107,17 @@ class Rows:
         """Return (n,) rows in which a selector has one of the values of a condition."""
         return self.cached(
             ("has", condition),
-            lambda: np.isin(self.raw(condition.field), condition.values),
+            lambda: self._has(condition),
         )
+
+    def _has(self, condition: Condition) -> Bools:
+        raw = self.raw(condition.field)
+        if len(condition.values) > FEW:
+            return np.isin(raw, condition.values)
+        found = np.zeros(len(raw), np.bool_)
+        for value in condition.values:
+            found |= raw == value
+        return found
 
     def si(self, tag: FieldTag) -> Any:
         """Return a tagged column in SI (degrees for latitude and longitude), NaN where it is unknown."""

@@ -80,7 +80,8 @@ def _bounded(chunks: Iterable[list[Chunk]]) -> Iterator[list[Chunk]]:
 
 
 def _magic_bytes(data: bytes) -> int:
-    return data.count(STX_V1) + data.count(STX_V2)
+    octets = np.frombuffer(data, np.uint8)
+    return int(np.count_nonzero(octets - np.uint8(STX_V2) <= STX_V1 - STX_V2))
 
 
 def read_batches(
