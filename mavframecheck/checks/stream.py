@@ -293,8 +293,9 @@ class DuplicatedTraffic(Check):
         self._recent, self._recent_number = keys[kept], numbers[kept]
 
     def _count(self, frames: Frames, rows: Ints, repeated: Bools) -> None:
-        for sysid, count in zip(*np.unique(frames.sysid[rows], return_counts=True), strict=True):
-            self._frames[int(sysid)] += int(count)
+        for sysid, count in enumerate(np.bincount(frames.sysid[rows]).tolist()):
+            if count:
+                self._frames[sysid] += count
         for sysid in np.flatnonzero(np.bincount(frames.sysid[repeated])).tolist():
             mine = repeated & (frames.sysid == sysid)
             self._twice[sysid] += int(np.count_nonzero(mine))

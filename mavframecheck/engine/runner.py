@@ -154,19 +154,21 @@ class Runner:
             seen = _applies(rule, binding, rows)
             if not seen.any():
                 continue
-            scope = RuleScope(rows, binding)
+            part, place = _part(rule, binding, rows, seen)
+            scope = RuleScope(part, binding)
+            inside = seen[place]
             if rule.when is not None:
-                seen &= rule.when(scope)
-            looked |= seen
-            if not seen.any():
+                inside &= rule.when(scope)
+            looked[place] |= inside
+            if not inside.any():
                 continue
-            found = seen & rule.flag(scope) & ~hit
-            hit |= found
-            by[found] = k
-            if rule.worst is not None and found.any():
-                badness[found] = np.nan_to_num(
-                    np.abs(np.broadcast_to(rule.worst(scope), len(rows))[found])
-                )
+            found = inside & rule.flag(scope) & ~hit[place]
+            if found.any():
+                hit[place] |= found
+                by[place[found]] = k
+                if rule.worst is not None:
+                    worst = np.abs(np.broadcast_to(rule.worst(scope), len(part)))
+                    badness[place[found]] = np.nan_to_num(worst[found])
         self._tallies[rule.rule.code].checked += int(looked.sum())
         if looked.any():
             self._collect(rule, label, bindings, rows, looked, hit, badness, by)
@@ -253,6 +255,20 @@ def _applies(rule: CompiledRule, binding: Binding, rows: Rows) -> Bools:
     if rule.rule.applies.autopilot:
         concerned &= _among(rows, "vehicle.autopilot", rule.autopilots)
     return concerned
+
+
+def _part(
+    rule: CompiledRule, binding: Binding, rows: Rows, seen: Bools
+) -> tuple[Rows, np.typing.NDArray[np.int64]]:
+    """Return the rows to evaluate a rule on, and where they are: all, or only the few that it is about.
+
+    Rules that are about the same few rows share them, and what is computed on them.
+    """
+    if np.count_nonzero(seen) * 2 > len(rows):
+        return rows, np.arange(len(rows))
+    place = np.flatnonzero(seen)
+    key = ("part", binding.conditions, rule.rule.applies.autopilot)
+    return rows.cached(key, lambda: rows.take(place)), place
 
 
 def _among(rows: Rows, name: str, choice: Choice) -> Bools:

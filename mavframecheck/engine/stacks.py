@@ -82,9 +82,12 @@ def _column(rows: Rows, asked: npt.NDArray[np.int64], of: Callable[..., Any]) ->
     commanded = "command" in rows.table.layout.by_name
     commands = rows.raw("command") if commanded else np.zeros(len(rows), np.int64)
     number = np.nan_to_num(versions.values, nan=-1.0)
-    kinds, which = np.unique(
-        np.stack([families.values, number, commands, asked], axis=1), axis=0, return_inverse=True
-    )
+    columns = (families.values, number, commands, asked)
+    if all((column == column[0]).all() for column in columns):
+        kinds, which = np.array([[column[0] for column in columns]]), np.zeros(len(rows), np.int64)
+    else:
+        table = np.stack(columns, axis=1)
+        kinds, which = np.unique(table, axis=0, return_inverse=True)
     answers = [
         of(
             _file_of(families.labels[int(family)]),
