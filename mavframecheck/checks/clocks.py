@@ -5,7 +5,8 @@ All share one model, `Context.clocks`; what it shows is drawn once, when the rec
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ from mavframecheck.semantics.enums import Clock
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.clocks import MAX_EVENTS, Seen, StepBack, Still
 from mavframecheck.vehicle.timing import STEP_S, Clocks, Pool, Step, Timing, wraps
-from mavframecheck.wire import Batch
+from mavframecheck.wire import Batch, Dialect
 
 Floats = npt.NDArray[np.float64]
 
@@ -33,9 +34,9 @@ class ClockCheck(Check):
     undecided = ""
     """Why it cannot say anything where it has no stream to judge."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know nothing yet."""
-        super().__init__(*args)  # type: ignore[arg-type]
+        super().__init__(params, dialect)
         self._context: Context | None = None
 
     def update(self, _batch: Batch, context: Context) -> None:

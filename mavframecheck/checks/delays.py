@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from mavframecheck.checks.clocks import ClockCheck, alike, ends, subject, words
 from mavframecheck.model import Scalar
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.timing import Timing
-from mavframecheck.wire import Batch, Table
+from mavframecheck.wire import Batch, Dialect, Table
 
 Floats = npt.NDArray[np.float64]
 
@@ -104,9 +104,9 @@ def _correlation(a: Floats, b: Floats) -> float:
 class StreamDelay(ClockCheck):
     """Positions that lag behind their own stamp, as the vehicle's movement shows."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no track yet."""
-        super().__init__(*args)
+        super().__init__(params, dialect)
         self._tracks: dict[tuple[int, str], _Track] = {}
         self._fields = dict.fromkeys(words(self.params["messages"]))
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from mavframecheck.checks.clocks import ClockCheck
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Table
+from mavframecheck.wire import Batch, Dialect, Table
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -63,9 +63,9 @@ class _Stream:
 class SetpointGaps(ClockCheck):
     """Breaks in the set-points of a vehicle that flies by them before and after."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no sender yet."""
-        super().__init__(*args)
+        super().__init__(params, dialect)
         self._streams: dict[int, _Stream] = {}
 
     def update(self, batch: Batch, context: Context) -> None:

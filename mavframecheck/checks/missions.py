@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,7 @@ from mavframecheck.semantics.enums import AltRef
 from mavframecheck.semantics.mavframe import FRAMES, GLOBAL_FRAMES
 from mavframecheck.semantics.names import family
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Table
+from mavframecheck.wire import Batch, Dialect, Table
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -87,9 +87,9 @@ class AltitudeProfile(Check):
     numbers in the items are close to each other: then one of the frames is wrong.
     """
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Remember nothing yet."""
-        super().__init__(*args)  # type: ignore[arg-type]
+        super().__init__(params, dialect)
         self._transactions = Transactions()
         self._homes: dict[int, _Heights] = {}
         self._differences: dict[int, _Heights] = {}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.origins import SAID, Geodetic, Home, Move, Origin, Registry
-from mavframecheck.wire import Batch, Table
+from mavframecheck.wire import Batch, Dialect, Table
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -223,9 +224,9 @@ class _Target(NamedTuple):
 class _Targets(Check):
     """A check of local targets against origins that they might have been meant for."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no stream yet."""
-        super().__init__(*args)  # type: ignore[arg-type]
+        super().__init__(params, dialect)
         self._streams: dict[tuple[int, int, str], _Target] = {}
         self._found: dict[tuple[int, int, str, int], _Target] = {}
         self._checked = 0
@@ -301,9 +302,9 @@ class _Targets(Check):
                 nearest, best = near, _reading(at, other, shift) | {"away_m": away, "near_m": near}
         return best
 
+    @abstractmethod
     def others(self, origin: Origin, registry: Registry, number: Ints) -> Sequence[Origin]:
         """Return the origins that a target may have been meant for instead."""
-        raise NotImplementedError
 
     def finish(self) -> Iterable[Observation]:
         """Return the streams whose targets fit another origin."""
@@ -369,9 +370,9 @@ class OldOrigin(_Targets):
 class OtherOrigin(_Targets):
     """Local targets that make sense from the origin of another vehicle, or go to several alike."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no stream yet."""
-        super().__init__(*args)
+        super().__init__(params, dialect)
         self._sent: dict[tuple[int, int, str], list[_Sent]] = {}
 
     def others(self, origin: Origin, registry: Registry, number: Ints) -> Sequence[Origin]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +14,7 @@ from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Frames, Table
+from mavframecheck.wire import Batch, Dialect, Frames, Table
 
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
@@ -152,9 +153,9 @@ class SetpointCheck(Check):
 
     messages: tuple[str, ...] = (LOCAL, GLOBAL)
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Follow no stream yet."""
-        super().__init__(*args)  # type: ignore[arg-type]
+        super().__init__(params, dialect)
         self.checked = 0
         self.found: dict[tuple[int, int, str], Found] = {}
         self._subjects: dict[tuple[int, int, str], Subject] = {}
@@ -172,9 +173,9 @@ class SetpointCheck(Check):
     def learn(self, batch: Batch, context: Context) -> None:
         """Take in what a batch says of the vehicles."""
 
+    @abstractmethod
     def follow(self, stream: Stream) -> None:
         """Read the next rows of a stream."""
-        raise NotImplementedError
 
     def settle(self) -> None:
         """Forget what only this batch could ask for."""
@@ -216,9 +217,9 @@ class _Flicker:
 class FlickeringYaw(SetpointCheck):
     """Setpoints of one kind that switch between a yaw and none, over and over."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no stream yet."""
-        super().__init__(*args)
+        super().__init__(params, dialect)
         self._last: dict[tuple[int, int, str], _Flicker] = {}
 
     def follow(self, stream: Stream) -> None:
@@ -284,9 +285,9 @@ class RunawayOffset(SetpointCheck):
 
     messages = (LOCAL,)
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no vehicle yet."""
-        super().__init__(*args)
+        super().__init__(params, dialect)
         self._where = local_position()
         self._runs: dict[tuple[int, int, str], _Run] = {}
         self._unplaced = 0
@@ -412,9 +413,9 @@ class _Legs:
 class ZeroYaw(SetpointCheck):
     """A yaw of exactly 0 that nobody seems to have meant."""
 
-    def __init__(self, *args: object) -> None:
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no vehicle yet."""
-        super().__init__(*args)
+        super().__init__(params, dialect)
         self._local = local_position()
         self._global = AsOf("GLOBAL_POSITION_INT", {"lat": 1e-7, "lon": 1e-7})
         self._attitude = AsOf("ATTITUDE", {"yaw": 1.0})

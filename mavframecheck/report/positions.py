@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple, TypeAlias
@@ -214,16 +215,16 @@ def _column(field: Field, extract: Extract) -> Column:
     return Column(values, np.ones(size, np.bool_) if known is None else known)
 
 
-class Writer:
+class Writer(ABC):
     """Turns records into bytes of one format, piece by piece."""
 
     def head(self) -> bytes:
         """Return what comes before the first record."""
         return b""
 
+    @abstractmethod
     def body(self, records: Records) -> bytes:
         """Return some records."""
-        raise NotImplementedError
 
     def foot(self) -> bytes:
         """Return what comes behind the last record."""
