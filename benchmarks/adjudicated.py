@@ -2,10 +2,12 @@
 
 `expectations.toml` lists every error and warning on the real recordings with the reason why it is true,
 read from the bytes. One that it does not list is new: look at the bytes, then list it or mend the rule.
+It names a recording by its folder and the start of its SHA-256, since file names carry people's accounts.
 """
 
 from __future__ import annotations
 
+import hashlib
 import sys
 import tomllib
 from collections import Counter
@@ -16,6 +18,7 @@ from benchmarks.corpus import Checked, check_all, check_arguments, is_absent
 
 EXPECTATIONS = Path(__file__).parent / "expectations.toml"
 FOLDERS = ("tlog", "raw", "pcap")
+DIGITS = 16
 
 
 class Key(NamedTuple):
@@ -32,11 +35,17 @@ def confirmed() -> set[Key]:
     return {Key(entry["file"], entry["code"], entry["subject"]) for entry in listed}
 
 
-def loud(checked: Checked, root: Path) -> set[Key]:
-    """Return the errors and warnings on a recording, and print those that nobody has looked at."""
-    file = checked.path.relative_to(root).as_posix()
+def name_of(recording: Path) -> str:
+    """Return the name that `expectations.toml` has for a recording: folder and start of its SHA-256."""
+    with recording.open("rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    return f"{recording.parent.name}/{digest[:DIGITS]}"
+
+
+def loud(checked: Checked, file: str) -> set[Key]:
+    """Return the errors and warnings on the recording `file`, and say when it could not be checked."""
     if checked.failure:
-        print(f"failed        {file}  {checked.failure}")
+        print(f"failed        {checked.path}  {checked.failure}")
         return {Key(file, "failed", checked.failure)}
     return {
         Key(file, finding["code"], finding["subject"])
@@ -53,12 +62,17 @@ def main() -> int:
         return 0
     paths = sorted(p for folder in FOLDERS for p in (root / folder).iterdir())
     found: set[Key] = set()
+    path_of: dict[str, Path] = {}
     for checked in check_all(paths, options):
-        found |= loud(checked, root)
+        file = name_of(checked.path)
+        path_of[file] = checked.path
+        found |= loud(checked, file)
     known = confirmed()
     for word, keys in (("unconfirmed", found - known), ("gone", known - found)):
         for key in sorted(keys):
-            print(f"{word:14}{key.file}  {key.code} {key.subject}".rstrip())
+            print(
+                f"{word:14}{key.file}  {key.code} {key.subject}".rstrip(), path_of.get(key.file, "")
+            )
     by_code = Counter(key.code for key in found & known)
     said = ", ".join(f"{code} on {count}" for code, count in sorted(by_code.items()))
     print(

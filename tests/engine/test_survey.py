@@ -347,13 +347,13 @@ def test_counts_are_those_of_pymavlink(survey: Survey, tmp_path: Path) -> None:
         "sitl/clean_px4_mission_rtl.tlog",
         "sitl/clean_copter_guided_local.tlog",
         "sitl/clean_two_copters.tlog",
-        "real/tlog/geeksville__arduleader__test.tlog",
+        "real/tlog/*__test.tlog",
     ],
 )
 def test_real_recordings(name: str) -> None:
     """No count is below pymavlink's, which loses frames after damage; every range is one."""
-    path = CORPUS / name
-    if not path.exists():
+    path = next(CORPUS.glob(name), None)
+    if path is None:
         pytest.skip(
             "the recordings are not here: they live beside the checkout, in ../shared/corpus"
         )
