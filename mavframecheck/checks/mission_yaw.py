@@ -9,22 +9,19 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.checks.base import Check, Observation, Verdict, place
+from mavframecheck.checks.missions import MAX_MISSIONS, PLAIN_MISSION, flown
 from mavframecheck.geo.geodesy import bearing_deg, distance_m
 from mavframecheck.missions import Items, Mission, Transactions
 from mavframecheck.model import Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.mavframe import GLOBAL_FRAMES
-from mavframecheck.semantics.names import family
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Table
+from mavframecheck.wire import Batch, Dialect
 
 Ints = npt.NDArray[np.int64]
 
-MAX_MISSIONS = 200
 AUTOPILOT = 1
 """Component of an autopilot."""
-PLAIN_MISSION = 0
-"""MAV_MISSION_TYPE_MISSION."""
 YAW = 3
 """Where params holds param4."""
 WITH_YAW = np.array(
@@ -60,17 +57,10 @@ class ZeroYaw(Check):
     def update(self, batch: Batch, _context: Context) -> None:
         """Collect what vehicles say they are, and missions that end in this batch."""
         if "HEARTBEAT" in batch.tables:
-            self._identify(batch.tables["HEARTBEAT"])
+            for sysid, known, mav_type in flown(batch.tables["HEARTBEAT"]):
+                self._vehicles.setdefault(sysid, (known, mav_type))
         for mission in self._transactions.update(batch):
             self._keep(mission)
-
-    def _identify(self, beats: Table) -> None:
-        speaks = beats.take(np.flatnonzero(beats["autopilot"] != constant("MAV_AUTOPILOT.INVALID")))
-        systems, first = np.unique(speaks.frames.sysid, return_index=True)
-        for sysid, row in zip(systems.tolist(), first.tolist(), strict=True):
-            kind = int(speaks["type"][row])
-            known = family(int(speaks["autopilot"][row]), kind)
-            self._vehicles.setdefault(sysid, (known, kind))
 
     def _keep(self, mission: Mission) -> None:
         """Keep a mission once, however often it is sent; what a vehicle sends back is no input."""

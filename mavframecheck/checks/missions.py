@@ -41,6 +41,15 @@ _NO_HEIGHT = np.array([constant("MAV_CMD.NAV_LAND"), constant("MAV_CMD.NAV_VTOL_
 """Commands whose height is the ground, or not read."""
 
 
+def flown(beats: Table) -> Iterator[tuple[int, str, int]]:
+    """Yield each system's first word of what it flies in (n,) HEARTBEATs: system, family, MAV_TYPE."""
+    speaks = beats.take(np.flatnonzero(beats["autopilot"] != constant("MAV_AUTOPILOT.INVALID")))
+    systems, first = np.unique(speaks.frames.sysid, return_index=True)
+    for sysid, row in zip(systems.tolist(), first.tolist(), strict=True):
+        mav_type = int(speaks["type"][row])
+        yield sysid, family(int(speaks["autopilot"][row]), mav_type), mav_type
+
+
 class _Heights:
     """Heights of home, where they changed, in frame order."""
 
@@ -112,17 +121,10 @@ class AltitudeProfile(Check):
             difference = placed["alt"].astype(float) - placed["relative_alt"]
             self._remember(self._differences, placed, difference * 1e-3)
         if "HEARTBEAT" in batch.tables:
-            self._identify(batch.tables["HEARTBEAT"])
+            for sysid, known, _ in flown(batch.tables["HEARTBEAT"]):
+                self._families.setdefault(sysid, known)
         for mission in self._transactions.update(batch):
             self._keep(mission)
-
-    def _identify(self, beats: Table) -> None:
-        """Remember the first autopilot that each system says it has."""
-        speaks = beats.take(np.flatnonzero(beats["autopilot"] != constant("MAV_AUTOPILOT.INVALID")))
-        systems, first = np.unique(speaks.frames.sysid, return_index=True)
-        for sysid, row in zip(systems.tolist(), first.tolist(), strict=True):
-            kind = family(int(speaks["autopilot"][row]), int(speaks["type"][row]))
-            self._families.setdefault(sysid, kind)
 
     def _remember(self, kept: dict[int, _Heights], table: Table, heights: Floats) -> None:
         for sysid in np.unique(table.frames.sysid).tolist():

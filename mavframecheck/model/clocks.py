@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
+from mavframecheck.model.finding import FileSummary
+
 
 class ClockStep(msgspec.Struct, frozen=True, kw_only=True):
     """A place where receive time and stamp went different ways."""
@@ -93,18 +95,9 @@ class ComponentClock(msgspec.Struct, frozen=True, kw_only=True):
     """When it was started by its own SYSTEM_TIME, s since 1970."""
 
 
-class FileClocks(msgspec.Struct, frozen=True, kw_only=True):
+class FileClocks(FileSummary, frozen=True, kw_only=True):
     """The clocks of one recording."""
 
-    path: str
-    kind: str
-    messages: int
-    unknown: int
-    bad_crc: int
-    skipped_bytes: int
-    duration_s: float | None
-    time_start: float | None
-    notes: tuple[str, ...]
     streams: tuple[ClockStream, ...]
     """By sender, message and field."""
     restarts: tuple[ClockRestart, ...]

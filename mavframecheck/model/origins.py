@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
+from mavframecheck.model.finding import FileSummary
+
 
 class Fix(msgspec.Struct, frozen=True, kw_only=True):
     """A place on WGS 84, and the frame that gave it."""
@@ -68,19 +70,7 @@ class VehicleOrigins(msgspec.Struct, frozen=True, kw_only=True):
     launches: tuple[LaunchEntry, ...]
 
 
-class FileOrigins(msgspec.Struct, frozen=True, kw_only=True):
+class FileOrigins(FileSummary, frozen=True, kw_only=True):
     """The registry of one recording."""
 
-    path: str
-    kind: str
-    messages: int
-    """Good frames of known messages."""
-    unknown: int
-    """Frames whose id the dialect lacks."""
-    bad_crc: int
-    skipped_bytes: int
-    duration_s: float | None
-    time_start: float | None
-    """First plausible receive time, s since 1970."""
-    notes: tuple[str, ...]
     vehicles: tuple[VehicleOrigins, ...]

@@ -9,7 +9,7 @@ from mavframecheck.model.clocks import ClockExchange, ClockRestart, ClockStream,
 from mavframecheck.report import Context, Piece
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.layout import Page
-from mavframecheck.report.words import duration, plural, utc
+from mavframecheck.report.words import extent, plural, utc
 
 _DOMAINS = {
     "boot": "boot",
@@ -47,7 +47,7 @@ class _Clocks(Page):
     def file(self, clocks: FileClocks) -> Iterator[str]:
         """Yield the head, a table for each component, restarts and exchanges."""
         yield self.bold(sentence(clocks.path))
-        yield from self.wrap(_read(clocks), "  ", "    ")
+        yield from self.wrap(extent(clocks), "  ", "    ")
         for note in clocks.notes:
             yield from self.wrap(f"note: {note}", "  ", "    ")
         started = {(each.sysid, each.compid): each.boot_utc for each in clocks.components}
@@ -123,14 +123,6 @@ def _notes(stream: ClockStream) -> Iterator[str]:
     if steps:
         more = f" and {len(steps) - 4} more" if len(steps) > 4 else ""
         yield f"steps {', '.join(steps[:4])}{more}"
-
-
-def _read(clocks: FileClocks) -> str:
-    """Return what the file is, how long, how much."""
-    frames = plural(clocks.messages, "frame") if clocks.messages else "nothing could be decoded"
-    start = f" from {utc(clocks.time_start)}" if clocks.time_start is not None else ""
-    length = [duration(clocks.duration_s) + start] if clocks.duration_s is not None else []
-    return ", ".join([clocks.kind, *length, frames])
 
 
 def _restarted(each: ClockRestart) -> str:

@@ -96,8 +96,8 @@ def _accuracy(name: str) -> Read:
 
 def _origin_id(extract: Extract) -> Any:
     position = extract.position
-    held = isinstance(position, LocalPosition) and position.origin is not None
-    return position.origin.origin_id if held else None  # type: ignore[union-attr]
+    origin = position.origin if isinstance(position, LocalPosition) else None
+    return None if origin is None else origin.origin_id
 
 
 def _height(extract: Extract) -> Any:

@@ -16,7 +16,7 @@ from mavframecheck.report import Context, Piece
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.fields import is_spatial, meaning, refers_to, share, values
 from mavframecheck.report.layout import Page
-from mavframecheck.report.words import component, duration, plural, utc
+from mavframecheck.report.words import component, plural, what_was_read
 from mavframecheck.semantics.references import Reference
 
 _MOST_NAMED = 8
@@ -58,7 +58,7 @@ class _Map(Page):
         self._labels = {each.name: each.label for each in survey.references}
         self._labels |= {each.name: each.label for each in survey.heights}
         yield self.bold(sentence(survey.path))
-        yield from self.wrap(_read(survey), "  ", "    ")
+        yield from self.wrap(what_was_read(survey), "  ", "    ")
         for note in survey.notes:
             yield from self.wrap(f"note: {note}", "  ", "    ")
         senders = [sender for sender in survey.senders if sender.streams]
@@ -204,15 +204,6 @@ def _only_stamped(views: list[ViewSurvey]) -> bool:
     """Return whether a single time stamp is all that a message says of place and time."""
     spatial = [field for view in views for field in view.fields if is_spatial(field)]
     return len(spatial) == 1 and spatial[0].quantity == "timestamp"
-
-
-def _read(survey: FileSurvey) -> str:
-    """Return what the file is, how long, how much."""
-    frames = plural(survey.messages, "frame") if survey.messages else "nothing could be decoded"
-    start = f" from {utc(survey.time_start)}" if survey.time_start is not None else ""
-    length = [duration(survey.duration_s) + start] if survey.duration_s is not None else []
-    unknown = [f"{plural(survey.unknown, 'frame')} of unknown messages"] if survey.unknown else []
-    return ", ".join([survey.kind, *length, frames, *unknown])
 
 
 def _often(stream: StreamSurvey) -> str:

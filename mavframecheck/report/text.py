@@ -25,13 +25,12 @@ from mavframecheck.report.layout import SEVERITY_COLOURS, Page
 from mavframecheck.report.words import (
     autopilot,
     component,
-    duration,
     elapsed,
     is_number,
     plural,
     scalar,
     shortened,
-    utc,
+    what_was_read,
 )
 
 _MOST_COMPONENTS = 12
@@ -81,7 +80,7 @@ def _file(file: FileReport, findings: Sequence[Finding], page: Page) -> Iterator
 
 def _head(file: FileReport, page: Page) -> Iterator[str]:
     yield page.bold(sentence(file.path))
-    yield from page.wrap(_read(file), "  ", "    ")
+    yield from page.wrap(what_was_read(file), "  ", "    ")
     speakers = file.vehicles if page.context.verbose else file.vehicles[:_MOST_COMPONENTS]
     ids = [f"{vehicle.sysid}/{vehicle.compid}" for vehicle in speakers]
     column = max((len(text) for text in ids), default=0) + 2
@@ -91,15 +90,6 @@ def _head(file: FileReport, page: Page) -> Iterator[str]:
         yield f"  and {plural(len(file.vehicles) - len(speakers), 'more sender')} (--verbose)"
     for note in file.notes:
         yield from page.wrap(f"note: {note}", "  ", "    ")
-
-
-def _read(file: FileReport) -> str:
-    """Return what the file is, how long, how much."""
-    frames = plural(file.messages, "frame") if file.messages else "nothing could be decoded"
-    start = f" from {utc(file.time_start)}" if file.time_start is not None else ""
-    length = [duration(file.duration_s) + start] if file.duration_s is not None else []
-    unknown = [f"{plural(file.unknown, 'frame')} of unknown messages"] if file.unknown else []
-    return ", ".join([file.kind, *length, frames, *unknown])
 
 
 # ---- findings ----

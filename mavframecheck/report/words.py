@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 
 from mavframecheck.model import Vehicle
+from mavframecheck.model.finding import FileSummary
 from mavframecheck.report.escape import sentence
 from mavframecheck.semantics.names import FAMILY_NAMES
 
@@ -93,3 +94,17 @@ def component(vehicle: Vehicle) -> str:
         role = autopilot(vehicle)
     kind = sentence(vehicle.type or "").replace("_", " ").lower()
     return f"{role}, {kind}" if kind else role
+
+
+def extent(file: FileSummary) -> str:
+    """Return what the file is, how long, how much: ``tlog, 42 s from 2026-01-01 00:00:00 UTC, 210 frames``."""
+    frames = plural(file.messages, "frame") if file.messages else "nothing could be decoded"
+    start = f" from {utc(file.time_start)}" if file.time_start is not None else ""
+    length = [duration(file.duration_s) + start] if file.duration_s is not None else []
+    return ", ".join([file.kind, *length, frames])
+
+
+def what_was_read(file: FileSummary) -> str:
+    """Return its extent, and how many frames nobody could name."""
+    unknown = [f"{plural(file.unknown, 'frame')} of unknown messages"] if file.unknown else []
+    return ", ".join([extent(file), *unknown])

@@ -177,6 +177,10 @@ class _Metric(_Typed):
 
     xyz: Floats
 
+    def __post_init__(self) -> None:
+        """Bring `xyz` to (n, 3)."""
+        _set(self, xyz=_triples(self.xyz))
+
     @property
     def frame(self) -> tuple[object, ...]:
         """What must be equal for two to be in one frame; empty when nobody can tell."""
@@ -396,9 +400,6 @@ class EcefPosition(_Point):
     datum: str = WGS84
     representation: ClassVar[str] = "ecef"
 
-    def __post_init__(self) -> None:
-        _set(self, xyz=_triples(self.xyz))
-
     @property
     def frame(self) -> tuple[object, ...]:
         """See `_Metric.frame`."""
@@ -437,9 +438,6 @@ class LocalPosition(_Point):
     """None: nobody says where it is."""
     measured: Measured = field(default_factory=Measured)
     representation: ClassVar[str] = "cartesian"
-
-    def __post_init__(self) -> None:
-        _set(self, xyz=_triples(self.xyz))
 
     @property
     def frame(self) -> tuple[object, ...]:
@@ -503,8 +501,8 @@ class ProjectedPosition(_Point):
     def __post_init__(self) -> None:
         if not 1 <= self.zone <= 60:
             raise MixingError("a UTM position needs its zone, 1 to 60")
-        reference = AltRef(self.height_reference)
-        _set(self, xyz=_triples(self.xyz), height_reference=reference)
+        super().__post_init__()
+        _set(self, height_reference=AltRef(self.height_reference))
 
     @property
     def hemisphere(self) -> str:
@@ -544,9 +542,6 @@ class EcefVector(_Vector):
     unit: str = "m"
     datum: str = WGS84
 
-    def __post_init__(self) -> None:
-        _set(self, xyz=_triples(self.xyz))
-
     @property
     def frame(self) -> tuple[object, ...]:
         """See `_Metric.frame`."""
@@ -572,9 +567,6 @@ class LocalVector(_Vector):
     origin: Origin | None
     """Its directions, not its place: north at one origin is not north at another."""
     unit: str = "m"
-
-    def __post_init__(self) -> None:
-        _set(self, xyz=_triples(self.xyz))
 
     @property
     def frame(self) -> tuple[object, ...]:
@@ -609,9 +601,6 @@ class BodyVector(_Vector):
     unit: str = "m"
     measured: Measured = field(default_factory=Measured)
     representation: ClassVar[str] = "cartesian"
-
-    def __post_init__(self) -> None:
-        _set(self, xyz=_triples(self.xyz))
 
     @property
     def frame(self) -> tuple[object, ...]:
