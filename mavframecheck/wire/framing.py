@@ -136,7 +136,8 @@ class _Candidates:
     """Every magic byte of a buffer, read as if a frame began there; all arrays are (m,).
 
     A MAVLink 2 header with incompatibility flags that this reader does not know is none: such a frame
-    must be dropped (MAVLink developer guide, "Incompatibility Flags").
+    must be dropped (MAVLink developer guide, "Incompatibility Flags"). Where the buffer ends before those
+    flags it is not sure yet that this is a header.
     """
 
     def __init__(self, octets: np.typing.NDArray[np.uint8], size: int, dialect: Dialect) -> None:
@@ -157,6 +158,7 @@ class _Candidates:
         self.seeds = dialect.seeds(self.msgid)
         self.known: Bools = self.seeds >= 0
         self.whole: Bools = self.end <= size
+        self.sure: Bools = ~self.v2 | (at + 2 < size)
         self.good: Bools = np.zeros(len(at), np.bool_)
         self.checked: Bools = np.zeros(len(at), np.bool_)
 
@@ -204,7 +206,9 @@ class _Walk:
         self.slot[c.start] = np.arange(len(c.start), dtype=np.int32)
         self.successor = self.slot[c.end + self.gap]
         self.ends_file: Bools = (c.end == self.size) & self.final
-        self.followed: Bools = c.whole & ((self.successor >= 0) | self.ends_file)
+        self.due: Bools = (self.successor >= 0) & ~(c.sure[self.successor] | self.final)
+        """Whether the bytes that tell if a record follows are still to come."""
+        self.followed: Bools = c.whole & ((self.successor >= 0) & ~self.due | self.ends_file)
 
     def _certain(self) -> Bools:
         """Return the candidates that count without a closer look: certain frames follow each other."""
@@ -304,7 +308,10 @@ class _Walk:
             return False if self.final else None
         if self._is_good(following) or self.followed[following]:
             return True
-        return None if c.end[following] + self.gap >= self.size and not self.final else False
+        waiting = self.due[following] or (
+            c.end[following] + self.gap >= self.size and not self.final
+        )
+        return None if waiting else False
 
     def _resume(self, reason: str) -> bool:
         """Skip to the next frame whose checksum holds; return False when the buffer has no more.

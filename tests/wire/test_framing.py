@@ -132,6 +132,18 @@ class TestAnyBytes:
         assert np.count_nonzero(frames.crc_ok) >= 5
 
 
+def test_a_magic_byte_before_its_flags_have_come() -> None:
+    """What may be a header of MAVLink 2 is no record behind another until its flags are read."""
+    hurt = "fe1c0001011e00000000cdcccc3d000000009a99993e00000000000000000000803ea1ce"
+    torn = "fe1c0001011e00000000cdcccc"
+    good = "fd110000000101fd000006000000000000000000000000fdfe09fd628a"
+    stream = bytes.fromhex(hurt + torn + good)
+    at_once = read([stream], stamped=False)
+    in_pieces = read([stream[k : k + 1] for k in range(len(stream))], stamped=False)
+    assert described(in_pieces.frames) == described(at_once.frames)
+    assert in_pieces.damage == at_once.damage
+
+
 @both
 @pytest.mark.parametrize("byte", [0xFD, 0xFE, 0x00, 0xFF])
 def test_a_long_run_of_one_byte(byte: int, stamped: bool) -> None:
