@@ -202,9 +202,10 @@ class StampStream:
         """Take in further rows, in stretches of ``2 ** level`` frames."""
         self.rows += len(table)
         stamps = _as_int64(table[self.field.name])
-        given = (stamps > 0) & (stamps != 2**self.field.bits - 1) & (stamps != 2**63 - 1)
-        self.unset += int(np.count_nonzero(~given))
-        if not given.all():
+        highest = min(2**self.field.bits, 2**63) - 1
+        if stamps.min() <= 0 or stamps.max() >= highest:
+            given = (stamps > 0) & (stamps != highest) & (stamps != 2**63 - 1)
+            self.unset += int(np.count_nonzero(~given))
             table, stamps = table.take(given), stamps[given]
         if not len(stamps):
             return
@@ -219,28 +220,34 @@ class StampStream:
 
     def _compare(self, table: Table, stamps: Ints) -> None:
         """Look at each row beside the one before it."""
-        frames = table.frames
-        last = self._before
-        before = np.concatenate(([stamps[0] + 1 if last is None else last.stamp], stamps[:-1]))
-        same = stamps == before
-        back = stamps < before
-        unix = stamps * self.field.unit_us >= UNIX_S * 1e6
-        epoch = unix != (before * self.field.unit_us >= UNIX_S * 1e6)
-        if last is None:
-            back[0] = epoch[0] = False
+        frames, last = table.frames, self._before
+        before = np.concatenate(([stamps[0] - 1 if last is None else last.stamp], stamps[:-1]))
+        step = stamps - before
+        same, back = step == 0, np.flatnonzero(step < 0)
         self.repeated += int(np.count_nonzero(same))
-        self.back += int(np.count_nonzero(back))
-        self.late += int(np.count_nonzero(back & self._overtaken(frames)))
-        self.since_unix += int(np.count_nonzero(unix))
-        self._note(self.backs, frames, stamps, np.flatnonzero(back))
-        self._note(self.epochs, frames, stamps, np.flatnonzero(epoch))
+        self.back += len(back)
+        self.late += int(np.count_nonzero(self._overtaken(frames, back)))
+        self._note(self.backs, frames, stamps, back)
+        self._note(self.epochs, frames, stamps, self._new_epochs(before, stamps))
         self._stand(table, stamps, same)
 
-    def _overtaken(self, frames: Frames) -> Bools:
-        """Return (n,) rows that were sent before the row before, by the sender's sequence counter."""
-        seq = frames.seq.astype(np.int64)
-        before = seq[0] if self._before is None else self._before.seq
-        return np.asarray((seq - np.concatenate(([before], seq[:-1]))) % 256 >= 128)
+    def _new_epochs(self, before: Ints, stamps: Ints) -> Ints:
+        """Count the rows since 1970; return those that count from another time than the row `before`."""
+        since = UNIX_S * 1e6 / self.field.unit_us
+        if max(before[0], stamps.max()) < since:
+            return np.zeros(0, np.int64)
+        unix = stamps >= since
+        self.since_unix += int(np.count_nonzero(unix))
+        changed = unix[1:] != unix[:-1]
+        first = self._before is not None and (before[0] >= since) != unix[0]
+        return np.flatnonzero(np.concatenate(([first], changed)))
+
+    def _overtaken(self, frames: Frames, rows: Ints) -> Bools:
+        """Return which of `rows` were sent before the row before, by the sender's sequence counter."""
+        counters = frames.seq[np.maximum(rows - 1, 0)].astype(np.int64)
+        if self._before is not None:
+            counters[rows == 0] = self._before.seq
+        return np.asarray((frames.seq[rows].astype(np.int64) - counters) % 256 >= 128)
 
     def _note(self, kept: list[StepBack], frames: Frames, stamps: Ints, rows: Ints) -> None:
         for row in rows[: MAX_EVENTS - len(kept)].tolist():
@@ -256,6 +263,10 @@ class StampStream:
     def _stand(self, table: Table, stamps: Ints, same: Bools) -> None:
         """Continue and close runs of rows with one stamp."""
         frames, starts = table.frames, np.flatnonzero(~same)
+        if len(starts) == len(same):
+            self._close()
+            self._run = _run(frames, stamps, (len(same) - 1, len(same) - 1), 0)
+            return
         changed = np.cumsum(self._changes(table, same))
         lead = int(starts[0]) if len(starts) else len(same)
         if lead and self._run is not None:
@@ -269,11 +280,8 @@ class StampStream:
         long = frames.clock_us[ends] - frames.clock_us[starts] >= _STILL_US
         long[-1] = True
         for first, last in zip(starts[long].tolist(), ends[long].tolist()):
-            self._run = _Run(
-                *(seen(frames, first), seen(frames, last)),
-                *(int(frames.clock_us[first]), int(frames.clock_us[last])),
-                *(int(stamps[first]), last - first + 1, int(changed[last] - changed[first])),
-            )
+            differs = int(changed[last] - changed[first])
+            self._run = _run(frames, stamps, (first, last), differs)
             if last != ends[-1]:
                 self._close()
 
@@ -313,10 +321,12 @@ class StampStream:
     def _knot(self, frames: Frames, stamps: Ints, level: int) -> None:
         """Add rows with a believable receive time to the knots."""
         self.coarsen(level)
-        rows = np.flatnonzero(frames.t_valid)
-        if not len(rows):
+        if not frames.t_valid.all():
+            timed = np.flatnonzero(frames.t_valid)
+            frames, stamps = frames.take(timed), stamps[timed]
+        if not len(stamps):
             return
-        number, t_us, stamps = frames.number[rows], frames.t_us[rows], stamps[rows]
+        number, t_us = frames.number, frames.t_us
         starts, ends, stretch = _stretches(number >> level)
         low = _lowest(t_us - stamps * self.field.unit_us, starts, ends)
         new = np.empty(len(starts), KNOT)
@@ -325,7 +335,7 @@ class StampStream:
         new["t_us"], new["last_t_us"], new["low_t_us"] = t_us[starts], t_us[ends], t_us[low]
         new["stamp"], new["last_stamp"] = stamps[starts], stamps[ends]
         new["low_stamp"] = stamps[low]
-        new["offset"], new["size"] = frames.offset[rows[starts]], frames.size[rows[starts]]
+        new["offset"], new["size"] = frames.offset[starts], frames.size[starts]
         self.knots = self._joined(np.concatenate((self.knots, new)))
 
     def coarsen(self, level: int) -> None:
@@ -348,6 +358,14 @@ class StampStream:
         for name in ("low_t_us", "low_stamp"):
             joined[name] = knots[name][low]
         return joined
+
+
+def _run(frames: Frames, stamps: Ints, rows: tuple[int, int], changed: int) -> _Run:
+    """Return the rows from the first to the last of `rows`, which have one stamp."""
+    first, last = rows
+    times = int(frames.clock_us[first]), int(frames.clock_us[last])
+    where = seen(frames, first), seen(frames, last)
+    return _Run(*where, *times, int(stamps[first]), last - first + 1, changed)
 
 
 def _stretches(stretch: Ints) -> tuple[Ints, Ints, Ints]:

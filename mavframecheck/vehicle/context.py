@@ -7,13 +7,23 @@ about, those of a sender of the component that sent it.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from mavframecheck.vehicle.clocks import ClockBook
-from mavframecheck.vehicle.facts import NAMES, REGISTERED, SOURCES, WORDS, Name, Source, histories
+from mavframecheck.vehicle.facts import (
+    NAMES,
+    REGISTERED,
+    SOURCES,
+    WORDS,
+    Name,
+    Source,
+    ageless,
+    histories,
+)
 from mavframecheck.vehicle.history import Answer, Asked, Bools, History, Ints, Values
 from mavframecheck.vehicle.origins import MESSAGES, Registry
 from mavframecheck.vehicle.roles import ROLES, Meant, RoleBook
@@ -52,6 +62,57 @@ class Known(NamedTuple):
         return Known(values, self.known | later.known, later.labels)
 
 
+class _Meaning:
+    """Who sends the rows of a table, and whom they are about: nearly every rule asks for it."""
+
+    def __init__(self, table: Table, roles: RoleBook) -> None:
+        self.table = table
+        self._roles = roles
+
+    @functools.cached_property
+    def role(self) -> Ints:
+        """(n,) role of the sender, as a place in ROLES."""
+        return self._roles.of(self.table)
+
+    @functools.cached_property
+    def by_autopilot(self) -> Bools:
+        """(n,) rows that an autopilot sends."""
+        return np.asarray(self.role == ROLES.index("autopilot"))
+
+    @functools.cached_property
+    def meant(self) -> Meant:
+        """Whom each row is about."""
+        table, own = self.table, self.by_autopilot
+        sysid, number = table.frames.sysid.astype(np.int64), table.frames.number
+        if own.all():
+            return Meant(sysid, number)
+        told = own
+        about, since = self._roles.autopilot_for(table.frames)
+        about = np.where(own, sysid, about)
+        if "target_system" in table.layout.by_name:
+            target = table["target_system"].astype(np.int64)
+            told = own | (target > 0)
+            about = np.where(~own & (target > 0), target, about)
+        return Meant(about, np.where(told, number, since))
+
+    @functools.cached_property
+    def asked(self) -> Asked:
+        """What the rows ask the histories of systems for."""
+        key, since = self.meant
+        frames = self.table.frames
+        times = (frames.t_us, frames.t_valid, frames.clock_us)
+        return Asked(key, frames.number, since, *times)
+
+    @functools.cached_property
+    def asked_for_command(self) -> Asked:
+        """The same of the histories of systems and commands."""
+        asked, table = self.asked, self.table
+        commanded = "command" in table.layout.by_name
+        command = table["command"].astype(np.int64) if commanded else np.full(len(table), -1)
+        known = (asked.key >= 0) & (command >= 0)
+        return asked._replace(key=np.where(known, asked.key << 16 | command, -1))
+
+
 class Context:
     """Everything known so far, fed batch by batch."""
 
@@ -59,7 +120,11 @@ class Context:
         """Start knowing nothing; `autopilot` is the family to assume where no heartbeat tells one."""
         self._assumed = autopilot
         self._roles = RoleBook()
-        self._histories = {name: History(quantities) for name, quantities in histories().items()}
+        steady = ageless()
+        self._histories = {
+            name: History(quantities, ages=name not in steady)
+            for name, quantities in histories().items()
+        }
         self._words: dict[str, dict[str, int]] = {name: {UNKNOWN: 0} for name in WORDS}
         self._batch: Batch | None = None
         self._fed: set[str] = set()
@@ -68,11 +133,14 @@ class Context:
         self._clocks = ClockBook()
         self._clocked = False
         self._timing: Clocks | None = None
+        self._meanings: dict[int, _Meaning] = {}
+        """Of the tables asked about in this batch, by their identity."""
 
     def update(self, batch: Batch) -> None:
         """Take in what `batch` says. Call `settle` once every rule has read it."""
         self._batch = batch
         self._fed.clear()
+        self._meanings.clear()
         if "HEARTBEAT" in batch.tables:
             self._roles.update(batch.tables["HEARTBEAT"])
         self._registered = False
@@ -107,8 +175,7 @@ class Context:
         return self._registry
 
     def _by_autopilots(self, table: Table) -> Table:
-        speaks = self._roles.of(table) == ROLES.index("autopilot")
-        return table if speaks.all() else table.take(speaks)
+        return table.only(self._of(table).by_autopilot)
 
     def settle(self) -> None:
         """Forget what only rows of the current batch could ask for."""
@@ -119,7 +186,15 @@ class Context:
             history.settle()
         if self._batch is not None and len(self._batch):
             self._roles.settle(int(self._batch.frames.number[-1]))
+        self._meanings.clear()
         self._batch = None
+
+    def _of(self, table: Table) -> _Meaning:
+        """Return who speaks in a table and of whom, found out once in a batch."""
+        meaning = self._meanings.get(id(table))
+        if meaning is None:
+            meaning = self._meanings[id(table)] = _Meaning(table, self._roles)
+        return meaning
 
     def lookup(self, name: str, table: Table, *, late: bool = True) -> Known:
         """Return the context column `name` for the rows of `table`; KeyError for an unknown name.
@@ -128,21 +203,18 @@ class Context:
         """
         entry = NAMES[name]
         if entry.key == "sender":
-            return Known(self._roles.of(table), np.ones(len(table), np.bool_), ROLES)
-        asked = self._asked(entry, table)
+            return Known(self._of(table).role, np.ones(len(table), np.bool_), ROLES)
+        of = self._of(table)
+        asked = of.asked_for_command if entry.key == "command" else of.asked
         if not late:
             asked = asked._replace(key=np.where(asked.since > asked.number, -1, asked.key))
         answers = [
             (self._ready(h), q, self._answer(entry, h, asked, late=late)) for h, q in entry.sources
         ]
-        values, known = np.full(len(table), np.nan), np.zeros(len(table), np.bool_)
-        earliest = np.min([answer.number for _, _, answer in answers], axis=0)
-        for history, quantity, answer in answers:
-            said_before = answer.found & (answer.number < asked.since)
-            take = ~known & answer.found & (said_before | (answer.number == earliest))
-            values = np.where(take, history.values(quantity, answer), values)
-            known |= take
-        return self._column(name, entry, values, known)
+        history, quantity, answer = answers[0]
+        if len(answers) == 1 or (answer.found & (history.numbers(answer) < asked.since)).all():
+            return self._column(name, entry, history.values(quantity, answer), answer.found)
+        return self._column(name, entry, *_best(answers, asked))
 
     def _column(self, name: str, entry: Name, values: Values, known: Bools) -> Known:
         """Return numbers as they are; words as places in their list of texts."""
@@ -155,16 +227,6 @@ class Context:
             places = np.where(known, places, words.setdefault(self._assumed, len(words)))
             known = np.ones(len(known), np.bool_)
         return Known(places, known, tuple(words))
-
-    def _asked(self, entry: Name, table: Table) -> Asked:
-        key, since = self._meant(table)
-        if entry.key == "command":
-            commanded = "command" in table.layout.by_name
-            command = table["command"].astype(np.int64) if commanded else np.full(len(key), -1)
-            key = np.where((key >= 0) & (command >= 0), key << 16 | command, -1)
-        frames = table.frames
-        times = (frames.t_us, frames.t_valid, frames.clock_us)
-        return Asked(key, frames.number, since, *times)
 
     def _answer(self, entry: Name, history: str, asked: Asked, *, late: bool) -> Answer:
         """Find the value before each row, else the first one soon after it (an answer: only that)."""
@@ -222,7 +284,7 @@ class Context:
 
     def _rows(self, source: Source, table: Table) -> Ints:
         """Return the rows of a table in which an autopilot says something."""
-        speaks = self._roles.of(table) == ROLES.index("autopilot")
+        speaks = self._of(table).by_autopilot
         return np.flatnonzero(speaks if source.valid is None else speaks & source.valid(table))
 
     def _numbers(self, quantity: str, values: Values) -> Values:
@@ -256,26 +318,24 @@ class Context:
         It is the target; else, for what an autopilot sends, its own system; else the sender's system where
         that has an autopilot; else the only system with one.
         """
-        return self._meant(table).system
+        return self._of(table).meant.system
 
     def about_then(self, table: Table) -> Ints:
         """Return (n,) the same as it was known when each row was sent."""
-        meant = self._meant(table)
+        meant = self._of(table).meant
         return np.where(meant.since > table.frames.number, -1, meant.system)
 
-    def _meant(self, table: Table) -> Meant:
-        sysid, number = table.frames.sysid.astype(np.int64), table.frames.number
-        own = self._roles.of(table) == ROLES.index("autopilot")
-        if own.all():
-            return Meant(sysid, number)
-        told = own
-        about, since = self._roles.autopilot_for(table.frames)
-        about = np.where(own, sysid, about)
-        if "target_system" in table.layout.by_name:
-            target = table["target_system"].astype(np.int64)
-            told = own | (target > 0)
-            about = np.where(~own & (target > 0), target, about)
-        return Meant(about, np.where(told, number, since))
+
+def _best(answers: list[tuple[History, str, Answer]], asked: Asked) -> tuple[Values, Bools]:
+    """Return (n,) the value of the first source that spoke before a row, else of the first to speak."""
+    values, known = np.full(len(asked.key), np.nan), np.zeros(len(asked.key), np.bool_)
+    numbers = [history.numbers(answer) for history, _, answer in answers]
+    earliest = np.min(numbers, axis=0)
+    for (history, quantity, answer), number in zip(answers, numbers, strict=True):
+        take = ~known & answer.found & ((number < asked.since) | (number == earliest))
+        values = np.where(take, history.values(quantity, answer), values)
+        known |= take
+    return values, known
 
 
 def _keys(source: Source, table: Table) -> Ints:

@@ -70,11 +70,10 @@ def _families(table: Table) -> Values:
 
 
 def _modes(table: Table) -> Values:
-    named = [
-        mode_name(name, mode)
-        for name, mode in zip(_families(table).tolist(), table["custom_mode"].tolist(), strict=True)
-    ]
-    return np.array(named)
+    said = table["custom_mode"].astype(np.int64) << 16 | _kind(table)
+    modes, which = np.unique(said, return_inverse=True)
+    named = [mode_name(family(m & 0xFF, m >> 8 & 0xFF), m >> 16) for m in modes.tolist()]
+    return np.array(named)[which]
 
 
 def _kind(table: Table) -> Values:
@@ -88,9 +87,9 @@ def _is_autopilot(table: Table) -> Bools:
 
 
 def _banner_version(table: Table) -> Values:
-    texts, which = np.unique(table["text"], return_inverse=True)
-    versions = [roles.version_from_banner(text) or np.nan for text in texts.tolist()]
-    return np.array(versions, float)[which]
+    texts = table["text"].tolist()
+    versions = {text: roles.version_from_banner(text) or np.nan for text in set(texts)}
+    return np.array([versions[text] for text in texts], float)
 
 
 def _flight_sw_version(table: Table) -> Values:
@@ -366,3 +365,9 @@ def histories() -> dict[str, tuple[str, ...]]:
     for source in SOURCES:
         found.setdefault(source.history, {}).update(dict.fromkeys(source.reads))
     return {history: tuple(quantities) for history, quantities in found.items()}
+
+
+def ageless() -> frozenset[str]:
+    """Return the histories of which only what was said last counts, however long ago."""
+    aging = {h for n in NAMES.values() if n.max_age_us is not None or n.after for h, _ in n.sources}
+    return frozenset(histories()) - aging

@@ -41,8 +41,6 @@ class Answer(NamedTuple):
 
     place: Ints
     found: Bools
-    number: Ints
-    """Running number of the frame that said it."""
 
 
 class History:
@@ -51,8 +49,12 @@ class History:
     Holds what the current batch said and, before that, only the last value of each key.
     """
 
-    def __init__(self, quantities: tuple[str, ...]) -> None:
-        """Remember numbers for `quantities`; what was never said reads as NaN."""
+    def __init__(self, quantities: tuple[str, ...], *, ages: bool = True) -> None:
+        """Remember numbers for `quantities`; what was never said reads as NaN.
+
+        What does not age (`ages` False) is remembered where it changes: to say it again adds nothing.
+        """
+        self._ages = ages
         self._order: Ints = np.zeros(0, np.int64)
         self._t_us: Ints = np.zeros(0, np.int64)
         self._t_valid: Bools = np.zeros(0, np.bool_)
@@ -63,14 +65,24 @@ class History:
         """Add rows of a batch: the `key` and the frame of each, and its values."""
         order = np.concatenate((self._order, key << _NUMBER_BITS | frames.number))
         by = np.argsort(order, kind="stable")
+        if not self._ages:
+            by = by[self._news(order[by] >> _NUMBER_BITS, by, values)]
         self._order = order[by]
         self._t_us = np.concatenate((self._t_us, frames.t_us))[by]
         self._t_valid = np.concatenate((self._t_valid, frames.t_valid))[by]
         self._clock_us = np.concatenate((self._clock_us, frames.clock_us))[by]
         for name, old in self._values.items():
-            new = values.get(name)
-            blank = np.full(len(key), np.nan) if new is None else new
-            self._values[name] = np.concatenate((old, blank))[by]
+            new = _column(values, name, len(key))
+            self._values[name] = np.concatenate((old, new))[by]
+
+    def _news(self, key: Ints, by: Ints, values: dict[str, Values]) -> Bools:
+        """Return (n,) rows in order that begin a key, or say something else than the row before."""
+        news = np.diff(key, prepend=-1) != 0
+        for name, old in self._values.items():
+            said = np.concatenate((old, _column(values, name, len(by) - len(old))))[by]
+            other = said[1:] != said[:-1]
+            news[1:] |= other & ~(np.isnan(said[1:]) & np.isnan(said[:-1]))
+        return news
 
     def settle(self) -> None:
         """Forget all but the last value of each key: the batch is done."""
@@ -86,6 +98,9 @@ class History:
 
     def before(self, asked: Asked, max_age_us: int | None = None) -> Answer:
         """Find the last value said before each row, no older than `max_age_us`."""
+        if self._holds_for_all(asked) and max_age_us is None:
+            everywhere = np.zeros(len(asked.key), np.int64)
+            return Answer(everywhere, everywhere == 0)
         wanted = asked.key << _NUMBER_BITS | asked.since
         place = np.searchsorted(self._order, wanted, side="left") - 1
         answer = self._answer(asked, place, np.asarray(place >= 0))
@@ -93,25 +108,37 @@ class History:
             return answer
         return answer._replace(found=answer.found & self._near(asked, answer.place, max_age_us))
 
+    def _holds_for_all(self, asked: Asked) -> bool:
+        """Return whether a single value is known, said before any of the rows that ask, and of their key."""
+        if len(self._order) != 1 or not len(asked.key):
+            return False
+        key, number = divmod(int(self._order[0]), 1 << _NUMBER_BITS)
+        return bool((asked.key == key).all() and asked.since.min() > number)
+
     def after(self, asked: Asked, max_delay_us: int = LATE_US) -> Answer:
         """Find the first value said soon after each row."""
         wanted = asked.key << _NUMBER_BITS | asked.since
         place = np.searchsorted(self._order, wanted, side="left")
         answer = self._answer(asked, place, np.asarray(place < len(self._order)))
-        if not len(self._order):
+        if not answer.found.any():
             return answer
-        soon = answer.number - asked.number <= LATE_FRAMES
+        soon = self.numbers(answer) - asked.number <= LATE_FRAMES
         soon &= self._clock_us[answer.place] - asked.clock_us <= max_delay_us
         return answer._replace(found=answer.found & soon)
 
     def _answer(self, asked: Asked, place: Ints, inside: Bools) -> Answer:
+        """Return the places that lie inside the history and hold what is said of the key asked for."""
         if not len(self._order):
-            nothing = np.zeros(len(asked.key), np.int64)
-            return Answer(nothing, nothing.astype(np.bool_), nothing + _NEVER)
-        place = np.clip(place, 0, len(self._order) - 1)
-        found = inside & (self._order[place] >> _NUMBER_BITS == asked.key) & (asked.key >= 0)
-        number = self._order[place] & ((1 << _NUMBER_BITS) - 1)
-        return Answer(place, found, np.where(found, number, _NEVER))
+            return Answer(np.zeros(len(place), np.int64), np.zeros(len(place), np.bool_))
+        place = np.where(inside, place, 0)
+        return Answer(place, inside & (self._order[place] >> _NUMBER_BITS == asked.key))
+
+    def numbers(self, answer: Answer) -> Ints:
+        """Return (n,) the running number of the frame that said each value; the largest number for none."""
+        if not len(self._order):
+            return np.full(len(answer.place), _NEVER)
+        number = self._order[answer.place] & ((1 << _NUMBER_BITS) - 1)
+        return np.where(answer.found, number, _NEVER)
 
     def _near(self, asked: Asked, place: Ints, limit_us: int) -> Bools:
         """Return (n,) values within `limit_us` of their row; times that cannot be believed count as near."""
@@ -122,7 +149,8 @@ class History:
         """Return the quantity `name` at the places of `answer`, NaN where nothing was found."""
         if not len(self._order):
             return np.full(len(answer.place), np.nan)
-        return np.where(answer.found, self._values[name][answer.place], np.nan)
+        values = self._values[name][answer.place]
+        return values if answer.found.all() else np.where(answer.found, values, np.nan)
 
     def last(self, name: str, key: int) -> float | None:
         """Return the last value of the quantity `name` for one key, None when there is none."""
@@ -130,3 +158,9 @@ class History:
         if place < 0 or self._order[place] >> _NUMBER_BITS != key:
             return None
         return float(self._values[name][place])
+
+
+def _column(values: dict[str, Values], name: str, size: int) -> Values:
+    """Return (size,) what rows say of a quantity, NaN where they say nothing of it."""
+    said = values.get(name)
+    return np.full(size, np.nan) if said is None else said

@@ -186,7 +186,7 @@ class Registry:
             vehicle = self._vehicles.get(system)
             if vehicle is None:
                 vehicle = self._vehicles[system] = _Vehicle(system, self)
-            own = {name: table.take(table.frames.sysid == system) for name, table in tables.items()}
+            own = {name: table.only(table.frames.sysid == system) for name, table in tables.items()}
             asked = [event for event in requests if event.what.target in (0, system)]
             vehicle.update(batch.frames, {n: t for n, t in own.items() if len(t)}, asked)
 
@@ -280,12 +280,15 @@ class _Vehicle:
             elif restarts:
                 self._said.pop(kind, None)
         pairs = self._pairing.update(own.get("LOCAL_POSITION_NED"), own.get("GLOBAL_POSITION_INT"))
-        done = 0
+        done, first = 0, int(frames.number[0])
         for event in sorted(events, key=lambda each: each.seen.number):
+            clock_us = int(frames.clock_us[event.seen.number - first])
+            if event.kind == "home":
+                self._on_home(event, clock_us)
+                continue
             upto = int(np.searchsorted(pairs["number"], event.seen.number))
             self._infer(pairs[done:upto])
-            done = upto
-            self._clock_us = int(frames.clock_us[event.seen.number - int(frames.number[0])])
+            done, self._clock_us = upto, clock_us
             getattr(self, f"_on_{event.kind}")(event)
         self._infer(pairs[done:])
 
@@ -294,7 +297,7 @@ class _Vehicle:
         if self._compid is None:
             first = min(tables.values(), key=lambda table: int(table.frames.number[0])).frames
             self._compid, self._first = int(first.compid[0]), int(first.number[0])
-        own = {n: table.take(table.frames.compid == self._compid) for n, table in tables.items()}
+        own = {n: table.only(table.frames.compid == self._compid) for n, table in tables.items()}
         return {name: table for name, table in own.items() if len(table)}
 
     def _restarts(self, own: dict[str, Table], frames: Frames) -> list[_Event]:
@@ -304,7 +307,7 @@ class _Vehicle:
             return []
         number = np.concatenate([table.frames.number for table in tables])
         t_ms = np.concatenate([table["time_boot_ms"].astype(np.int64) for table in tables])
-        order = np.argsort(number)
+        order = np.argsort(number, kind="stable")
         restarts = self._clock.update(number[order], t_ms[order])
         first = int(frames.number[0])
         return [_Event(_seen(frames, each.certain - first), "restart", each) for each in restarts]
@@ -378,9 +381,10 @@ class _Vehicle:
             launch = Launch(*self._who, place, event.seen)
             self._registry.launches.append(launch)
 
-    def _on_home(self, event: _Event) -> None:
+    def _on_home(self, event: _Event, clock_us: int) -> None:
+        """Enter a home; it has no part in which origin holds."""
         if self._room("homes"):
-            armed_s, asked = self._armed_s(self._clock_us), self._asker("home", event.what)
+            armed_s, asked = self._armed_s(clock_us), self._asker("home", event.what, clock_us)
             home = Home(*self._who, event.what, event.seen, armed_s, asked)
             self._registry.homes.append(home)
 
@@ -395,7 +399,7 @@ class _Vehicle:
     def _on_origin(self, event: _Event) -> None:
         """Enter the origin that a message says: the one in force more exactly, or another one."""
         at, old = event.what, self.origin
-        asked = self._asker("origin", at)
+        asked = self._asker("origin", at, self._clock_us)
         said = Origin(0, *self._who, at, MSL, event.seen, event.boot_ms, SAID, asked)
         if old is not None and old.source != SAID and self._alike(old.at, at):
             self._confirm(said._replace(origin_id=old.origin_id))
@@ -461,7 +465,7 @@ class _Vehicle:
         at = Geodetic(float(best["lat0"]), float(best["lon0"]), float(best["alt0"]))
         old, good = self.origin, self._good
         boot_ms = int(first["t_ms"])
-        asked = self._asker("origin", at)
+        asked = self._asker("origin", at, self._clock_us)
         seen = _seen_in(run[-1])
         entered = self._enter(Origin(0, *self._who, at, MSL, seen, boot_ms, INFERRED, asked))
         if old is not None and len(good):
@@ -507,10 +511,10 @@ class _Vehicle:
         far = float(np.hypot(self._good["x"], self._good["y"])[0]) if len(self._good) else 0.0
         return bool(np.hypot(north, east) <= NEAR_M + SHARE * far and abs(down) <= NEAR_M)
 
-    def _asker(self, kind: str, at: Geodetic) -> int | None:
-        """Return who asked for an origin or home not long ago."""
+    def _asker(self, kind: str, at: Geodetic, clock_us: int) -> int | None:
+        """Return who asked for an origin or home not long before `clock_us`."""
         asked = self._asked.get(kind)
-        if asked is None or self._clock_us - asked.clock_us > ASKED_US:
+        if asked is None or clock_us - asked.clock_us > ASKED_US:
             return None
         north, east, _ = asked.at.shift_to(at) if asked.at is not None else (0.0, 0.0, 0.0)
         return asked.sender if np.hypot(north, east) <= 2 * NEAR_M else None

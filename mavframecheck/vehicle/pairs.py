@@ -23,6 +23,8 @@ NEAR_M = 1.0
 """And this much besides, m: noise, and estimators that shift a little."""
 APART_MS = 300
 """Stamps of the two further apart than this make no pair."""
+THINNED_MS = 200
+"""Of positions that come faster only the first in each such stretch of the vehicle's clock is paired."""
 ACCELERATION = 10.0
 """How much a vehicle may accelerate between the two, m/s2."""
 _MS = 1e-3
@@ -65,7 +67,8 @@ class Pairing:
         """Start with no position seen."""
         self._local = np.zeros(0, _LOCAL)
         self._global = np.zeros(0, _GLOBAL)
-        """The last row of each."""
+        """The last row of each that was kept."""
+        self._thin_local, self._thin_global = _Thinning(), _Thinning()
 
     @property
     def last_global(self) -> Rows:
@@ -78,20 +81,17 @@ class Pairing:
             (int(rows["number"][-1]) for rows in (self._local, self._global) if len(rows)),
             default=-1,
         )
-        locals_ = np.concatenate((self._local, _local_rows(local)))
-        globals_ = np.concatenate((self._global, _global_rows(globe)))
+        locals_ = np.concatenate((self._local, _local_rows(local, self._thin_local)))
+        globals_ = np.concatenate((self._global, _global_rows(globe, self._thin_global)))
         self._local, self._global = locals_[-1:], globals_[-1:]
         if not (len(locals_) and len(globals_)):
             return np.zeros(0, PAIR)
-        before_local = np.searchsorted(globals_["number"], locals_["number"]) - 1
-        before_global = np.searchsorted(locals_["number"], globals_["number"]) - 1
-        by_local = np.column_stack((np.arange(len(locals_)), before_local))
-        by_global = np.column_stack((before_global, np.arange(len(globals_))))
-        which = np.concatenate((by_local, by_global))
-        which = which[(which >= 0).all(axis=1)]
-        pairs = _pairs(locals_[which[:, 0]], globals_[which[:, 1]])
-        pairs = pairs[(pairs["number"] > known) & (pairs["slack"] < np.inf)]
-        return pairs[np.argsort(pairs["number"], kind="stable")]
+        one, other = _neighbours(locals_["number"], globals_["number"])
+        number = np.maximum(locals_["number"][one], globals_["number"][other])
+        apart_ms = np.abs(locals_["t_ms"][one] - globals_["t_ms"][other])
+        kept = np.flatnonzero((number > known) & (apart_ms <= APART_MS))
+        kept = kept[np.argsort(number[kept], kind="stable")]
+        return _pairs(locals_[one[kept]], globals_[other[kept]])
 
     def forget(self) -> None:
         """Forget the last positions: the vehicle was started anew."""
@@ -107,32 +107,53 @@ def _seen(table: Table, dtype: np.dtype[np.void]) -> Rows:
     return rows
 
 
-def _local_rows(table: Table | None) -> Rows:
+def _neighbours(one: Ints, other: Ints) -> tuple[Ints, Ints]:
+    """Return the places of each frame of either stream, and of the last one of the other before it."""
+    before_one = np.searchsorted(other, one) - 1
+    before_other = np.searchsorted(one, other) - 1
+    first = np.concatenate((np.arange(len(one)), before_other))
+    second = np.concatenate((before_one, np.arange(len(other))))
+    both = np.flatnonzero((first >= 0) & (second >= 0))
+    return first[both], second[both]
+
+
+class _Thinning:
+    """Keeps the first row of each stretch of `THINNED_MS` of one stream, batch by batch."""
+
+    def __init__(self) -> None:
+        self._last = -1
+
+    def of(self, table: Table, sound: npt.NDArray[np.bool_]) -> Table:
+        """Return the rows to keep of those that are `sound`."""
+        rows = np.flatnonzero(sound)
+        stretch = table["time_boot_ms"][rows].astype(np.int64) // THINNED_MS
+        kept = table.take(rows[np.diff(stretch, prepend=self._last) != 0])
+        self._last = int(stretch[-1]) if len(stretch) else self._last
+        return kept
+
+
+def _local_rows(table: Table | None, thinning: _Thinning) -> Rows:
     if table is None:
         return np.zeros(0, _LOCAL)
-    rows = _seen(table, _LOCAL)
-    for name in ("x", "y", "z", "vx", "vy", "vz"):
-        rows[name] = table[name]
-    sound = np.isfinite(rows["x"] + rows["y"] + rows["z"] + rows["vx"] + rows["vy"] + rows["vz"])
-    kept: Rows = rows[sound]
-    return kept
+    names = ("x", "y", "z", "vx", "vy", "vz")
+    kept = thinning.of(table, np.isfinite(sum(table[name] for name in names)))
+    rows = _seen(kept, _LOCAL)
+    for name in names:
+        rows[name] = kept[name]
+    return rows
 
 
-def _global_rows(table: Table | None) -> Rows:
+def _global_rows(table: Table | None, thinning: _Thinning) -> Rows:
     if table is None:
         return np.zeros(0, _GLOBAL)
-    rows = _seen(table, _GLOBAL)
-    rows["lat"], rows["lon"], rows["alt"] = (
-        table["lat"] / 1e7,
-        table["lon"] / 1e7,
-        table["alt"] / 1e3,
-    )
-    placed: Rows = rows[(rows["lat"] != 0) | (rows["lon"] != 0)]
-    return placed
+    kept = thinning.of(table, (table["lat"] != 0) | (table["lon"] != 0))
+    rows = _seen(kept, _GLOBAL)
+    rows["lat"], rows["lon"], rows["alt"] = kept["lat"] / 1e7, kept["lon"] / 1e7, kept["alt"] / 1e3
+    return rows
 
 
 def _pairs(local: Rows, globe: Rows) -> Rows:
-    """Return (n,) pairs of rows; `slack` is infinite where they are too far apart in time."""
+    """Return (n,) pairs of rows, which are no further apart than `APART_MS`."""
     pairs = np.zeros(len(local), PAIR)
     later = local["number"] >= globe["number"]
     for name in ("number", "t_us", "offset", "size"):
@@ -144,6 +165,5 @@ def _pairs(local: Rows, globe: Rows) -> Rows:
     pairs["lat"], pairs["lon"], pairs["alt"] = lat, lon, globe["alt"] - local["vz"] * dt
     pairs["lat0"], pairs["lon0"] = moved(lat, lon, -local["x"], -local["y"])
     pairs["alt0"] = pairs["alt"] + local["z"]
-    slack = NEAR_M + ACCELERATION / 2 * dt**2
-    pairs["slack"] = np.where(np.abs(dt) <= APART_MS * _MS, slack, np.inf)
+    pairs["slack"] = NEAR_M + ACCELERATION / 2 * dt**2
     return pairs

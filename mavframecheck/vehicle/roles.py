@@ -62,9 +62,11 @@ def _roles_by_type() -> dict[int, str]:
 
 
 @functools.cache
-def role_table() -> npt.NDArray[np.int64]:
+def role_table() -> npt.NDArray[np.int8]:
     """(65536,) role by convention of each sender (``sysid * 256 + compid``), as a place in ROLES."""
-    by_component = np.array([ROLES.index(role_from_ids(0, compid)) for compid in range(256)])
+    by_component = np.array(
+        [ROLES.index(role_from_ids(0, compid)) for compid in range(256)], np.int8
+    )
     table = np.tile(by_component, 256)
     table[_GCS_SYSTEM << 8 :] = ROLES.index("gcs")
     return table

@@ -258,7 +258,7 @@ class Tracks:
             if source.valid is not None:
                 good &= source.valid(table)
             if good.any():
-                yield from _split(source, table if good.all() else table.take(good))
+                yield from _split(source, table.only(good))
 
     def _add(self, key: TrackKey, table: Table) -> None:
         track = self.tracks.get(key)

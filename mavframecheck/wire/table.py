@@ -65,6 +65,10 @@ class Table:
         """Return a table of the rows at `rows`."""
         return Table(self.layout, self._source, self._rows[rows], self.columns[rows])
 
+    def only(self, holds: Bools) -> Table:
+        """Return a table of the rows for which `holds`, (n,): itself where that is all of them."""
+        return self if holds.all() else self.take(np.flatnonzero(holds))
+
     def compact(self) -> Table:
         """Return the same rows without holding on to the rest of their batch."""
         return Table(self.layout, self.frames.own(), np.arange(len(self)), self.columns)
