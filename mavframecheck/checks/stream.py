@@ -267,6 +267,7 @@ class DuplicatedTraffic(Check):
         """Remember nothing yet."""
         super().__init__(params, dialect)
         self._recent: Ints = np.zeros(0, np.int64)
+        """Keys of the frames that are still near, and their numbers."""
         self._recent_number: Ints = np.zeros(0, np.int64)
         self._frames: Counter[int] = Counter()
         self._twice: Counter[int] = Counter()
@@ -278,19 +279,28 @@ class DuplicatedTraffic(Check):
         rows = np.flatnonzero(frames.crc_ok)
         if not len(rows):
             return
-        key = (frames.sender[rows] << 48) | (frames.checksum[rows].astype(np.int64) << 32)
-        key |= (frames.seq[rows].astype(np.int64) << 24) | (frames.msgid[rows] & 0xFFFFFF)
-        keys = np.concatenate((self._recent, key))
-        numbers = np.concatenate((self._recent_number, frames.number[rows]))
-        order = _suspects(keys)
-        order = order[np.argsort(keys[order], kind="stable")]
+        near = len(self._recent)
+        slots = np.concatenate((self._recent >> 24 & _SLOTS, _slots(frames, rows)))
+        some = np.flatnonzero(_shared(slots))
+        fresh = rows[some[some >= near] - near]
+        keys = np.concatenate((self._recent[some[some < near]], _keys(frames, fresh)))
+        shared = _shared((keys ^ keys >> 20 ^ keys >> 37) & _SLOTS)
+        some, keys = some[shared], keys[shared]
+        numbers = np.concatenate((self._recent_number, frames.number[rows]))[some]
+        order = np.argsort(keys, kind="stable")
         same = (np.diff(keys[order]) == 0) & (np.diff(numbers[order]) <= self.params["window"])
-        again = order[1:][same]
+        again = some[order[1:][same]]
         repeated = np.zeros(len(frames), np.bool_)
-        repeated[rows[again[again >= len(self._recent)] - len(self._recent)]] = True
+        repeated[rows[again[again >= near] - near]] = True
         self._count(frames, rows, repeated)
-        kept = numbers > frames.number[-1] - self.params["window"]
-        self._recent, self._recent_number = keys[kept], numbers[kept]
+        self._remember(frames, rows)
+
+    def _remember(self, frames: Frames, rows: Ints) -> None:
+        """Keep what the next frames may repeat."""
+        oldest = frames.number[-1] - self.params["window"]
+        near, kept = rows[frames.number[rows] > oldest], self._recent_number > oldest
+        self._recent = np.concatenate((self._recent[kept], _keys(frames, near)))
+        self._recent_number = np.concatenate((self._recent_number[kept], frames.number[near]))
 
     def _count(self, frames: Frames, rows: Ints, repeated: Bools) -> None:
         for sysid, count in enumerate(np.bincount(frames.sysid[rows]).tolist()):
@@ -313,11 +323,26 @@ class DuplicatedTraffic(Check):
         return Verdict(sum(self._frames.values()))
 
 
-def _suspects(keys: Ints) -> Ints:
-    """Return the places of all keys that may occur twice: those that share a slot of a hash table."""
-    slot = (keys ^ keys >> 20 ^ keys >> 37) & (2**20 - 1)
-    owner = np.zeros(2**20, np.int32)
-    owner[slot] = np.arange(len(keys), dtype=np.int32)
-    shared = np.zeros(2**20, np.bool_)
-    shared[slot[owner[slot] != np.arange(len(keys))]] = True
-    return np.flatnonzero(shared[slot])
+_SLOTS = 2**20 - 1
+
+
+def _keys(frames: Frames, rows: Ints) -> Ints:
+    """Return (n,) sender, checksum, sequence number and message as one number."""
+    key = (frames.sender[rows] << 48) | (frames.checksum[rows].astype(np.int64) << 32)
+    return key | (frames.seq[rows].astype(np.int64) << 24) | (frames.msgid[rows] & 0xFFFFFF)
+
+
+def _slots(frames: Frames, rows: Ints) -> Ints:
+    """Return (n,) the part of each key that tells most frames apart: checksum and sequence number."""
+    slot = frames.checksum[rows].astype(np.int64) << 8 | frames.seq[rows]
+    return slot & _SLOTS
+
+
+def _shared(slots: Ints) -> Bools:
+    """Return (n,) which of the numbers occur more than once."""
+    owner = np.zeros(_SLOTS + 1, np.int32)
+    places = np.arange(len(slots), dtype=np.int32)
+    owner[slots] = places
+    twice = np.zeros(_SLOTS + 1, np.bool_)
+    twice[slots[owner[slots] != places]] = True
+    return twice[slots]

@@ -106,12 +106,14 @@ class Episodes:
         self._streams: dict[tuple[str, str, str | None], dict[int, _Stream]] = {}
         self._observed: list[Episode] = []
 
+    def follows(self, code: str, message: str, label: str | None) -> bool:
+        """Return whether a rule has had hits on a message, so that rows without one matter too."""
+        return (code, message, label) in self._streams
+
     def collect(self, rule: CompiledRule, message: str, label: str | None, judged: Judged) -> None:
         """Add rows in frame order; rows of one stream must come in the order in which they were sent."""
         streams = self._streams.setdefault((rule.rule.code, message, label), {})
         hits = np.flatnonzero(judged.hit)
-        if not len(hits) and not streams:
-            return
         fresh = [s for s in dict.fromkeys(judged.stream[hits].tolist()) if s not in streams]
         for stream in fresh[: MAX_STREAMS - len(streams)]:
             streams[stream] = _Stream()

@@ -8,6 +8,7 @@ else is an error that names the column of the text.
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol
@@ -59,6 +60,9 @@ class Scope(Protocol):
     def context(self, name: str) -> Any:
         """Return a context column, e.g. ``vehicle.lat``."""
 
+    def known(self, name: str) -> Any:
+        """Return where a context column is known."""
+
 
 Evaluate = Callable[[Scope], Any]
 
@@ -106,6 +110,7 @@ class Expression:
         """Context that it can do without."""
         self.used_names: set[str] = set()
         self._names = names
+        self._depth = 0
         self._evaluate = self._compile(_parse(source))
 
     def __call__(self, scope: Scope) -> Any:
@@ -121,7 +126,12 @@ class Expression:
         compiler = _COMPILERS.get(type(node))
         if compiler is None:
             raise _error(node, f"{type(node).__name__} is not allowed in an expression")
-        return compiler(self, node)
+        if self._depth >= MAX_DEPTH:
+            raise _error(node, "nested too deeply")
+        self._depth += 1
+        compiled = compiler(self, node)
+        self._depth -= 1
+        return compiled
 
     def _constant(self, node: ast.Constant) -> Evaluate:
         value = node.value
@@ -141,11 +151,11 @@ class Expression:
         return lambda scope: scope.name(name)
 
     def _attribute(self, node: ast.Attribute) -> Evaluate:
-        if not isinstance(node.value, ast.Name):
+        name = _dotted(node)
+        if not name or not isinstance(node.value, ast.Name):
             raise _error(
                 node, "a dotted name has two parts, as in home.alt_msl or MAV_FRAME.LOCAL_NED"
             )
-        name = f"{node.value.id}.{node.attr}"
         if name in NAMES:
             self.contexts.add(name)
             return lambda scope: scope.context(name)
@@ -305,18 +315,11 @@ class Expression:
         """Compile ``known(home.lat)``: whether this context has come, or came in time."""
         name = self._context_of(node, "known")
         self.tested.add(name)
-
-        def evaluate(scope: Scope) -> Any:
-            found = np.asarray(scope.context(name))
-            return (
-                found != "unknown" if found.dtype.kind == "U" else np.logical_not(np.isnan(found))
-            )
-
-        return evaluate
+        return lambda scope: scope.known(name)
 
     def _context_of(self, node: ast.Call, function: str) -> str:
         """Return the context name that a call is about."""
-        name = ast.unparse(node.args[0]) if len(node.args) == 1 else ""
+        name = _dotted(node.args[0]) if len(node.args) == 1 else ""
         if name not in NAMES:
             raise _error(node, f"{function}() takes one context name, as in {function}(home.lat)")
         return name
@@ -346,21 +349,10 @@ def _parse(source: str) -> ast.expr:
         raise ExpressionError(
             f"not an expression ({error})", getattr(error, "offset", None) or 1
         ) from error
-    if _depth(tree) > MAX_DEPTH:
-        text = "nested too deeply"
-        raise ExpressionError(text, 1)
     return tree.body
 
 
-def _depth(tree: ast.AST) -> int:
-    """Return how deeply a tree is nested, without recursion."""
-    deepest, level = 0, [tree]
-    while level:
-        deepest += 1
-        level = [child for node in level for child in ast.iter_child_nodes(node)]
-    return deepest
-
-
+@functools.cache
 def _arity(function: Callable[..., Any]) -> tuple[int, int]:
     """Return how many values a function takes; numpy's would take one more for an array to write to."""
     if isinstance(function, np.ufunc):
@@ -369,6 +361,13 @@ def _arity(function: Callable[..., Any]) -> tuple[int, int]:
     if any(p.kind is p.VAR_POSITIONAL for p in parameters):
         return 2, MAX_LENGTH
     return sum(p.default is p.empty for p in parameters), len(parameters)
+
+
+def _dotted(node: ast.expr) -> str:
+    """Return ``home.lat`` for the name in two parts that a node is, nothing for any other."""
+    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+        return f"{node.value.id}.{node.attr}"
+    return ""
 
 
 def _link(operator: Callable[..., Any], left: Evaluate, right: Evaluate) -> Evaluate:

@@ -53,7 +53,7 @@ class _Hall:
         """Return the rows of the senders that count, None when there is none."""
         if rows is None:
             return None
-        speaks = _among(rows, "sender.role", self._senders)
+        speaks = rows.context("sender.role").among(self._senders.allows)
         if not speaks.any():
             return None
         if not self.desks:
@@ -146,8 +146,7 @@ class Runner:
 
         Several bindings with one label (views of one field) act as one.
         """
-        looked = np.zeros(len(rows), np.bool_)
-        hit = np.zeros(len(rows), np.bool_)
+        looked, hit = np.zeros((2, len(rows)), np.bool_)
         badness = np.zeros(len(rows))
         by = np.zeros(len(rows), np.int64)
         for k, binding in enumerate(bindings):
@@ -158,19 +157,24 @@ class Runner:
             scope = RuleScope(part, binding)
             inside = seen[place]
             if rule.when is not None:
-                inside &= rule.when(scope)
-            looked[place] |= inside
+                inside = inside & rule.when(scope)
             if not inside.any():
                 continue
-            found = inside & rule.flag(scope) & ~hit[place]
-            if found.any():
-                hit[place] |= found
-                by[place[found]] = k
-                if rule.worst is not None:
-                    worst = np.abs(np.broadcast_to(rule.worst(scope), len(part)))
-                    badness[place[found]] = np.nan_to_num(worst[found])
-        self._tallies[rule.rule.code].checked += int(looked.sum())
-        if looked.any():
+            looked[place] |= inside
+            found = inside & rule.flag(scope)
+            if not found.any():
+                continue
+            found &= ~hit[place]
+            hit[place] |= found
+            rows_found = np.arange(len(rows))[place][found]
+            by[rows_found] = k
+            if rule.worst is not None:
+                worst = np.abs(np.broadcast_to(rule.worst(scope), len(part)))
+                badness[rows_found] = np.nan_to_num(worst[found])
+        self._tallies[rule.rule.code].checked += int(np.count_nonzero(looked))
+        if hit.any() or (
+            looked.any() and self._episodes.follows(rule.rule.code, rows.table.name, label)
+        ):
             self._collect(rule, label, bindings, rows, looked, hit, badness, by)
         return looked
 
@@ -253,28 +257,23 @@ def _applies(rule: CompiledRule, binding: Binding, rows: Rows) -> Bools:
     """Return (n,) rows that a binding judges."""
     concerned = _concerns(binding, rows)
     if rule.rule.applies.autopilot:
-        concerned &= _among(rows, "vehicle.autopilot", rule.autopilots)
+        words = rule.rule.applies.autopilot
+        concerned &= rows.among("vehicle.autopilot", words, rule.autopilots.allows)
     return concerned
 
 
 def _part(
     rule: CompiledRule, binding: Binding, rows: Rows, seen: Bools
-) -> tuple[Rows, np.typing.NDArray[np.int64]]:
+) -> tuple[Rows, slice | np.typing.NDArray[np.int64]]:
     """Return the rows to evaluate a rule on, and where they are: all, or only the few that it is about.
 
     Rules that are about the same few rows share them, and what is computed on them.
     """
     if np.count_nonzero(seen) * 2 > len(rows):
-        return rows, np.arange(len(rows))
+        return rows, slice(None)
     place = np.flatnonzero(seen)
     key = ("part", binding.conditions, rule.rule.applies.autopilot)
     return rows.cached(key, lambda: rows.take(place)), place
-
-
-def _among(rows: Rows, name: str, choice: Choice) -> Bools:
-    """Return (n,) rows whose context word is among those of `choice`."""
-    column = rows.context(name)
-    return column.among(choice.allows)
 
 
 def _words(rule: CompiledRule, scope: RuleScope | ValueScope) -> Words:

@@ -77,6 +77,10 @@ class RuleScope:
         """Return the values of a context column."""
         return self.rows.context(name).words
 
+    def known(self, name: str) -> Any:
+        """Return where a context column is known."""
+        return self.rows.context(name).known
+
     def _refuse(self, problem: str) -> NoReturn:
         message = f"rule {self.binding.rule.rule.code}: {problem}"
         raise RuleFileError(message)
@@ -119,6 +123,8 @@ class ValueScope:
     def context(self, name: str) -> Any:
         """Context is unknown here."""
         raise RuleFileError(f"{name} cannot be used in the texts of a Python check")
+
+    known = context
 
 
 def _used(rows: Rows, tag: FieldTag) -> Any:

@@ -31,7 +31,10 @@ class Queue:
             return None
         both = parts[0] if len(parts) == 1 else join(parts)
         both.refresh(self.names)
-        undecided = ~both.complete(self.names) & ~_too_old(both, now, self._patience_us)
+        complete = both.complete(self.names)
+        if complete.all():
+            return both
+        undecided = ~complete & ~_too_old(both, now, self._patience_us)
         if not undecided.any():
             return both
         held = _from_first(both.stream, undecided)

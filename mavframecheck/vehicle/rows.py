@@ -78,6 +78,10 @@ class Rows:
             complete &= self.context(name).known
         return complete
 
+    def among(self, name: str, words: tuple[str, ...], choice: Callable[[str], bool]) -> Bools:
+        """Return (n,) rows whose context word is allowed by `choice`, which says the same as `words`."""
+        return self.cached(("among", name, words), lambda: self.context(name).among(choice))
+
     @property
     def about(self) -> Ints:
         """(n,) the system each row is about, negative where unknown."""
@@ -125,8 +129,12 @@ class Rows:
         return self.cached(key, lambda: self._si(tag))
 
     def _si(self, tag: FieldTag) -> Any:
-        missing = self.unknown(tag) | ~_per_row(self.present(tag.field), self.raw(tag.field))
-        return np.where(missing, np.nan, self.raw(tag.field) * tag.scale)
+        si = self.raw(tag.field) * tag.scale
+        may_be_absent = self.table.layout.by_name[tag.field].extension
+        if not tag.sentinels and not may_be_absent:
+            return si
+        missing = self.unknown(tag) | ~_per_row(self.present(tag.field), si)
+        return np.where(missing, np.nan, si)
 
     def used(self, tag: FieldTag) -> Bools:
         """Return (n,) whether the row's own mask lets the field count, and the sender gave it."""

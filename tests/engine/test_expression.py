@@ -40,6 +40,10 @@ class Columns:
         self.asked.append(name)
         return self._columns[name.replace(".", "_")]
 
+    def known(self, name: str) -> Any:
+        column = np.asarray(self.context(name))
+        return column != "unknown" if column.dtype.kind == "U" else ~np.isnan(column)
+
     def stack(self, key: str) -> Any:
         return self._columns[key]
 
