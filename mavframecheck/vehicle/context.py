@@ -262,8 +262,11 @@ class Context:
         for source in _SOURCES_OF[name]:
             table = self._batch.tables.get(source.message) if self._batch is not None else None
             if table is not None:
-                rows = self._rows(source, table)
-                kept = table.take(_last_of_each(_keys(source, table), rows) if only_last else rows)
+                said = self._said(source, table)
+                if only_last:
+                    kept = table.take(_last_of_each(_keys(source, table), np.flatnonzero(said)))
+                else:
+                    kept = table.only(said)
                 if len(kept):
                     values = {q: self._numbers(q, read(kept)) for q, read in source.reads.items()}
                     self._histories[name].extend(_keys(source, kept), kept.frames, values)
@@ -282,10 +285,10 @@ class Context:
         }
         self._histories[name].extend(keys, frames.take(rows), values)
 
-    def _rows(self, source: Source, table: Table) -> Ints:
-        """Return the rows of a table in which an autopilot says something."""
+    def _said(self, source: Source, table: Table) -> Bools:
+        """Return (n,) rows of a table in which an autopilot says something."""
         speaks = self._of(table).by_autopilot
-        return np.flatnonzero(speaks if source.valid is None else speaks & source.valid(table))
+        return speaks if source.valid is None else speaks & source.valid(table)
 
     def _numbers(self, quantity: str, values: Values) -> Values:
         """Return a column as numbers; words as places in their list of texts."""

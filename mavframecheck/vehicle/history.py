@@ -64,37 +64,37 @@ class History:
     def extend(self, key: Ints, frames: Frames, values: dict[str, Values]) -> None:
         """Add rows of a batch: the `key` and the frame of each, and its values."""
         order = np.concatenate((self._order, key << _NUMBER_BITS | frames.number))
-        by = np.argsort(order, kind="stable")
-        if not self._ages:
-            by = by[self._news(order[by] >> _NUMBER_BITS, by, values)]
+        by: Ints | slice = slice(None)
+        if (order[1:] < order[:-1]).any():
+            by = np.argsort(order, kind="stable")
         self._order = order[by]
         self._t_us = np.concatenate((self._t_us, frames.t_us))[by]
         self._t_valid = np.concatenate((self._t_valid, frames.t_valid))[by]
         self._clock_us = np.concatenate((self._clock_us, frames.clock_us))[by]
         for name, old in self._values.items():
-            new = _column(values, name, len(key))
-            self._values[name] = np.concatenate((old, new))[by]
+            new = values.get(name)
+            said = np.full(len(key), np.nan) if new is None else new
+            self._values[name] = np.concatenate((old, said))[by]
+        if not self._ages:
+            self._keep(self._news())
 
-    def _news(self, key: Ints, by: Ints, values: dict[str, Values]) -> Bools:
-        """Return (n,) rows in order that begin a key, or say something else than the row before."""
-        news = np.diff(key, prepend=-1) != 0
-        for name, old in self._values.items():
-            said = np.concatenate((old, _column(values, name, len(by) - len(old))))[by]
-            other = said[1:] != said[:-1]
-            news[1:] |= other & ~(np.isnan(said[1:]) & np.isnan(said[:-1]))
+    def _news(self) -> Bools:
+        """Return (n,) rows that begin a key, or say something else than the row before."""
+        news: Bools = np.diff(self._order >> _NUMBER_BITS, prepend=-1) != 0
+        for said in self._values.values():
+            news[1:] |= (said[1:] != said[:-1]) & ~(np.isnan(said[1:]) & np.isnan(said[:-1]))
         return news
 
     def settle(self) -> None:
         """Forget all but the last value of each key: the batch is done."""
-        key = self._order >> _NUMBER_BITS
-        last = np.flatnonzero(np.diff(key, append=-1))
-        self._order, self._t_us, self._t_valid = (
-            self._order[last],
-            self._t_us[last],
-            self._t_valid[last],
-        )
-        self._clock_us = self._clock_us[last]
-        self._values = {name: values[last] for name, values in self._values.items()}
+        self._keep(np.diff(self._order >> _NUMBER_BITS, append=-1) != 0)
+
+    def _keep(self, rows: Bools) -> None:
+        if rows.all():
+            return
+        self._order, self._t_us = self._order[rows], self._t_us[rows]
+        self._t_valid, self._clock_us = self._t_valid[rows], self._clock_us[rows]
+        self._values = {name: values[rows] for name, values in self._values.items()}
 
     def before(self, asked: Asked, max_age_us: int | None = None) -> Answer:
         """Find the last value said before each row, no older than `max_age_us`."""
@@ -158,9 +158,3 @@ class History:
         if place < 0 or self._order[place] >> _NUMBER_BITS != key:
             return None
         return float(self._values[name][place])
-
-
-def _column(values: dict[str, Values], name: str, size: int) -> Values:
-    """Return (size,) what rows say of a quantity, NaN where they say nothing of it."""
-    said = values.get(name)
-    return np.full(size, np.nan) if said is None else said

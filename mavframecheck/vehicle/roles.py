@@ -126,7 +126,7 @@ class RoleBook:
     def of(self, table: Table) -> Ints:
         """Return (n,) the role of each sender before each row, as a place in ROLES."""
         sender = table.frames.sender
-        role: Ints = self._before[sender]
+        role = self._before[sender].astype(np.int64)
         if (self._role == self._before[self._order >> _NUMBER_BITS]).all():
             return role
         place = np.searchsorted(self._order, sender << _NUMBER_BITS | table.frames.number) - 1
