@@ -226,9 +226,11 @@ class LostFrames(Check):
         self._received[sender] += len(rows)
         self._lost[sender] += int((step[gap] - 1).sum())
         self._last[sender] = int(seq[-1])
-        holes = np.zeros(len(frames), np.bool_)
-        holes[rows[gap]] = True
-        self._spans.setdefault(sender, _Span()).add(frames, holes)
+        span = self._spans.setdefault(sender, _Span())
+        if gap.any():
+            holes = np.zeros(len(frames), np.bool_)
+            holes[rows[gap]] = True
+            span.add(frames, holes)
 
     def finish(self) -> Iterable[Observation]:
         """Return one observation per sender that lost more than the rule allows."""
