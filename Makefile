@@ -39,6 +39,7 @@ generate: $(READY)  ## write again what is generated into the package
 	$(BIN)/python -m mavframecheck.engine.pack
 	$(BIN)/python -m mavframecheck.report.schema
 	$(BIN)/python -m tools.pages.rules
+	$(BIN)/python -m tools.pages.shown
 
 docs: $(DOCS_READY)  ## the documentation site into build/site; a broken link fails
 	$(BIN)/python -m tools.pages.site

@@ -1,10 +1,10 @@
-"""The first bad example of a rule: what is sent, one frame of it byte by byte, what the tool prints."""
+"""The first bad example of a rule: what is sent, one frame of it byte by byte, what is printed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from io import BytesIO
-from typing import Any
+from typing import Any, NamedTuple
 
 from mavframecheck import __version__
 from mavframecheck.engine import Pack, Settings
@@ -26,29 +26,38 @@ _MOST_RAW = 48
 _SENDERS = {"gcs": "the ground station"}
 
 
-def bad_example(rule: Rule) -> Iterator[str]:
-    """Yield the parts of a page about the first example that the rule finds fault with."""
+class Judged(NamedTuple):
+    """The first example that a rule finds fault with, as a recording and its report."""
+
+    example: Example
+    data: bytes
+    checked: Checked
+
+
+def judged(rule: Rule) -> Judged:
+    """Return the first bad example of `rule`, judged by it alone."""
     example = next(each for each in rule.example if each.expect == "bad")
     data = recording(example, load_dialect())
-    checked = _checked(rule, data)
-    tlog = Tlog(data)
+    pack = Pack((rule,), {rule.code: rule.code})
+    opened = Recording(_FILE, BytesIO(data), None)
+    checked = Checked(*check_recording(opened, pack, Settings(preview=True), load_dialect()))
+    return Judged(example, data, checked)
+
+
+def shown(rule: Rule, found: Judged) -> Iterator[str]:
+    """Yield what is sent, one message of it byte by byte, and what the tool prints for it."""
+    example, tlog = found.example, Tlog(found.data)
     yield _before(example)
     if sum(step.repeat for step in example.step) > 1 or example.raw:
         yield _steps(example)
-    where = checked.findings[0].location
+    where = found.checked.findings[0].location
     if isinstance(where, ByteLocation):
         yield from _frame(tlog, where)
     yield "What the tool prints for it:"
     options = " --preview" if rule.status == "preview" else ""
     command = f"$ mavframecheck check --select {rule.code}{options} {_FILE}"
-    yield fence("\n".join([command, *"".join(render([checked], _context())).splitlines()]))
-
-
-def _checked(rule: Rule, data: bytes) -> Checked:
-    """Judge a recording with one rule."""
-    pack = Pack((rule,), {rule.code: rule.code})
-    opened = Recording(_FILE, BytesIO(data), None)
-    return Checked(*check_recording(opened, pack, Settings(preview=True), load_dialect()))
+    report = "".join(render([found.checked], _context()))
+    yield fence(f"{command}\n{report}")
 
 
 def _context() -> Context:

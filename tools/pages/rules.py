@@ -15,7 +15,7 @@ from mavframecheck.engine import Pack
 from mavframecheck.engine.pack import load_pack, source_folder
 from mavframecheck.model import Rule
 from mavframecheck.report.words import setting
-from tools.pages.examples import bad_example
+from tools.pages.examples import Judged, judged, shown
 from tools.pages.markdown import code, fence, page, paragraphs, table, text
 
 FOLDER = Path(__file__).parents[2] / "docs" / "rules"
@@ -134,6 +134,7 @@ def _rule(rule: Rule, source: str) -> str:
 
 
 def _rule_parts(rule: Rule, source: str) -> Iterator[str]:
+    found = judged(rule)
     yield f"# {rule.code} {text(rule.name)}"
     yield (
         f"**{rule.severity}**, {rule.confidence} confidence, {rule.status}, since {rule.since} "
@@ -143,9 +144,9 @@ def _rule_parts(rule: Rule, source: str) -> Iterator[str]:
     yield "## Why it matters"
     yield paragraphs(rule.explain.why)
     yield "## How to mend it"
-    yield paragraphs(rule.explain.fix)
+    yield _fix(rule, found)
     yield "## Example"
-    yield from bad_example(rule)
+    yield from shown(rule, found)
     yield from _left_alone(rule)
     yield "## What it looks for"
     yield from _check(rule)
@@ -153,6 +154,13 @@ def _rule_parts(rule: Rule, source: str) -> Iterator[str]:
     yield from _parameters(rule, source)
     yield "## References"
     yield "\n".join(f"- {text(each)}" for each in rule.explain.references)
+
+
+def _fix(rule: Rule, found: Judged) -> str:
+    """Return the remedy; one that holds numbers of the finding as it reads for the example."""
+    if "{" not in rule.explain.fix:
+        return paragraphs(rule.explain.fix)
+    return f"For the example below: {paragraphs(found.checked.findings[0].fix)}"
 
 
 def _left_alone(rule: Rule) -> Iterator[str]:
