@@ -6,6 +6,7 @@ import math
 import re
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega
 
 from tools.pages.rules import FOLDER, pages
 
@@ -39,3 +40,23 @@ def test_page_has_all_parts(name: str) -> None:
     code = name.removesuffix(".md")
     assert f"$ mavframecheck check --select {code}" in WRITTEN[name]
     assert re.search(rf"^  (error|warning|info) {code} ", WRITTEN[name], re.MULTILINE)
+
+
+NAMED = [name for name, page in sorted(WRITTEN.items()) if "the first that the finding is" in page]
+"""Pages whose bytes are a good frame of a known message."""
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_bytes_are_the_message_of_the_table(name: str) -> None:
+    """The bytes on a page, decoded by pymavlink, are the message and the numbers of the table above them."""
+    page = WRITTEN[name].split("the first that the finding is about", 1)
+    called = re.findall(r"`(\w+)`", page[0])[-1]
+    table = dict(re.findall(r"^\| `(\w+)` \| ([^|]*?) \|", page[1], re.MULTILINE))
+    octets = re.findall(
+        r"^(?:header|payload|checksum| ) +((?:[0-9a-f]{2} ?)+)$", page[1], re.MULTILINE
+    )
+    message = ardupilotmega.MAVLink(None).decode(bytearray.fromhex("".join(octets)))
+    assert message.get_type() == called
+    for field, shown in table.items():
+        if re.fullmatch(r"-?[\d.e+-]+", shown) and hasattr(message, field):
+            assert float(shown) == pytest.approx(getattr(message, field), rel=1e-6), field

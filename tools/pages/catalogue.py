@@ -102,7 +102,8 @@ def _message(name: str, judged: dict[str, list[str]]) -> Iterator[str]:
     tags = _own(name)
     yield f"# {name}"
     number = _id(name)
-    yield f"Message {number}." if number else "Only in the XML of mavlink/mavlink."
+    source = f"Message {number}" if number else "Only in the XML of mavlink/mavlink"
+    yield f"{source}. [All messages](index.md); the words are explained in {_WORDS}."
     if name in CARRIERS:
         yield (
             "What params mean hangs on the command: here is what all commands with a place share, "
@@ -172,7 +173,9 @@ def _height(tag: FieldTag) -> str:
         return ""
     if tag.alt_ref in ("by_frame", "by_field"):
         return f"by {tag.frame_field}"
-    return height_reference(tag.alt_ref).label.removeprefix("above ")
+    return (
+        height_reference(tag.alt_ref).label.removeprefix("above ").removeprefix("height reference ")
+    )
 
 
 def _counts(tag: FieldTag) -> str:

@@ -85,7 +85,7 @@ def _known(key: str, value: Any) -> str:
 def _steps(example: Example) -> str:
     """Return a table of what is sent, in the order of the example."""
     rows = [_step(step) for step in example.step[:_MOST_STEPS]]
-    parts = [table(("s", "from", "message", "fields that are not zero", "how often"), rows)]
+    parts = [table(("s", "from", "message", "fields (others are zero)", "how often"), rows)]
     if len(example.step) > _MOST_STEPS:
         parts.append(f"and {plural(len(example.step) - _MOST_STEPS, 'more row')} like these.")
     if example.raw:

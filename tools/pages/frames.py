@@ -109,7 +109,7 @@ def _meaning(field: FieldSurvey) -> str:
 
 def _said(field: FieldSurvey) -> str:
     """Return what came in words; the share of a single message is always all of it."""
-    return ", ".join(values(field)).replace(" 100 %", "")
+    return ", ".join(values(field)).replace(" 100 %", "").replace(", (", " (")
 
 
 def _raw(rows: Table, name: str, row: int) -> str:

@@ -16,7 +16,13 @@ from click.testing import CliRunner
 from mavframecheck.cli import main
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("README.md", "docs/index.md", "docs/getting-started.md", "docs/ci.md", "docs/ground-station.md")
+PAGES = (
+    "README.md",
+    "docs/index.md",
+    "docs/getting-started.md",
+    "docs/ci.md",
+    "docs/ground-station.md",
+)
 _BLOCK = re.compile(r"^```(?:text|console)?\n(\$ mavframecheck .*?)^```", re.MULTILINE | re.DOTALL)
 _ENVIRONMENT = {"COLUMNS": "80", "GITHUB_ACTIONS": None, "NO_COLOR": "1"}
 
