@@ -3,11 +3,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+DOCS_READY := $(VENV)/.docs-ready
 CORPUS ?= ../shared/corpus
 BASELINE ?= build/corpus-baseline.jsonl
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check generate samples bench accuracy injection corpus-frames corpus-diff clean
+.PHONY: help demo test check generate docs samples bench accuracy injection corpus-frames corpus-diff clean
 
 help:  ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -15,6 +16,10 @@ help:  ## list these targets
 $(READY): pyproject.toml constraints-dev.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints-dev.txt -e '.[dev]'
+	@touch $@
+
+$(DOCS_READY): $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints-dev.txt -e '.[docs]'
 	@touch $@
 
 demo: $(READY)  ## audit the samples: exit 1 (findings) is what they are for, 2 and 3 are failures
@@ -33,6 +38,12 @@ generate: $(READY)  ## write again what is generated into the package
 	$(BIN)/python -m mavframecheck.semantics.acceptance
 	$(BIN)/python -m mavframecheck.engine.pack
 	$(BIN)/python -m mavframecheck.report.schema
+	$(BIN)/python -m tools.pages.rules
+	$(BIN)/python -m tools.pages.shown
+
+docs: $(DOCS_READY)  ## the documentation site into build/site; a broken link fails
+	$(BIN)/python -m tools.pages.site
+	$(BIN)/zensical build --strict --clean
 
 samples: $(READY)  ## write samples/ again
 	$(BIN)/python -m samples.make
@@ -54,5 +65,5 @@ corpus-diff: $(READY)  ## findings added and removed since `make corpus-diff SAV
 	$(BIN)/python -m benchmarks.corpus_diff --corpus $(CORPUS) --baseline $(BASELINE) $(SAVE)
 
 clean:  ## remove everything that make made
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist .cache .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
