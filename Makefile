@@ -8,7 +8,7 @@ CORPUS ?= ../shared/corpus
 BASELINE ?= build/corpus-baseline.jsonl
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check generate docs samples bench accuracy injection corpus-frames corpus-diff clean
+.PHONY: help demo test fuzz check generate docs samples bench accuracy injection corpus-frames corpus-diff clean
 
 help:  ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -27,6 +27,9 @@ demo: $(READY)  ## audit the samples: exit 1 (findings) is what they are for, 2 
 
 test: $(READY)  ## run every test
 	$(BIN)/python -m pytest
+
+fuzz: $(READY)  ## the property tests with new examples (`make test` takes the same ones every time)
+	$(BIN)/python -m pytest -q -m hypothesis --hypothesis-profile fresh
 
 check: $(READY)  ## lint, format, types
 	$(BIN)/ruff check .
