@@ -15,9 +15,9 @@ from mavframecheck.cli.options import (
     rules_option,
     selected,
 )
-from mavframecheck.cli.output import echo, page_context
+from mavframecheck.cli.output import deliver, page_context, parse_outputs
 from mavframecheck.model import Severity
-from mavframecheck.report import FORMATS, load
+from mavframecheck.report import FORMATS
 
 if TYPE_CHECKING:
     from mavframecheck.engine import Pack, Settings
@@ -43,6 +43,14 @@ _FAMILIES = ("px4", "arducopter", "arduplane", "ardurover", "ardusub")
     default="text",
     show_default=True,
     help="text is for people; json and jsonl are described in docs/output.md.",
+)
+@click.option(
+    "--output",
+    "outputs",
+    metavar="FORMAT=PATH",
+    multiple=True,
+    callback=parse_outputs,
+    help="Also write a report in this format to this file. Repeatable: one pass gives several.",
 )
 @click.option(
     "--select",
@@ -86,6 +94,7 @@ def check(
     /,
     paths: tuple[str, ...],
     form: str,
+    outputs: list[tuple[str, Path]],
     fail_on: str,
     directories: tuple[Path, ...],
     verbose: bool,
@@ -104,7 +113,7 @@ def check(
     pack = load_rules(directories)
     audit = Audit(paths, pack, _settings(pack, **chosen))
     context = page_context(verbose=verbose)._replace(rules=tuple(pack.rules))
-    echo(load(form)(audit.results(), context))
+    deliver(audit.results(), form, outputs, context)
     ctx.exit(audit.verdict(Severity(fail_on)))
 
 

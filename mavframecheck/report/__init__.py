@@ -22,6 +22,10 @@ class Checked(NamedTuple):
     findings: tuple[Finding, ...]
 
 
+FILE_WIDTH = 80
+"""Columns of text in a file or a pipe."""
+
+
 class Context(NamedTuple):
     """What a format may want to know beside the results."""
 
@@ -29,12 +33,16 @@ class Context(NamedTuple):
     """Version of mavframecheck."""
     rules: tuple[Rule, ...] = ()
     """The rules that were at hand, for formats that describe them."""
-    width: int = 80
+    width: int = FILE_WIDTH
     """Columns to write for."""
     terminal: bool = False
     """Whether a person is watching: text for a pipe keeps its last line in one piece."""
     colour: bool = False
     verbose: bool = False
+
+    def for_a_file(self) -> Context:
+        """Return the context for a report that nobody watches being written."""
+        return self._replace(width=FILE_WIDTH, terminal=False, colour=False)
 
 
 Piece: TypeAlias = str | bytes
