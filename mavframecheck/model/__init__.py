@@ -11,6 +11,7 @@ from mavframecheck.model.finding import (
     RuleRun,
     Scalar,
     Subject,
+    Suppressed,
     Vehicle,
 )
 from mavframecheck.model.rule import (
@@ -49,5 +50,6 @@ __all__ = [
     "Status",
     "Step",
     "Subject",
+    "Suppressed",
     "Vehicle",
 ]
