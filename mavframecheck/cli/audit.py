@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import click
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
 
 from mavframecheck import engine
-from mavframecheck.cli.files import DONE, Advance, Files
-from mavframecheck.model import Severity
-from mavframecheck.report import Checked
+from mavframecheck.cli.files import DONE, FAILED, Advance, Files
+from mavframecheck.cli.output import complain
+from mavframecheck.cli.progress import Progress
+from mavframecheck.cli.settings import Chosen
+from mavframecheck.report import Checked, Remark
 from mavframecheck.report.escape import sentence
 
 FINDINGS = 1
@@ -18,21 +20,69 @@ FINDINGS = 1
 class Audit(Files[Checked]):
     """The files of one `check`."""
 
-    def __init__(self, paths: Sequence[str], pack: engine.Pack, settings: engine.Settings) -> None:
-        super().__init__(paths, self._judge)
-        self._pack = pack
-        self._settings = settings
+    usage_errors = (*Files.usage_errors, engine.SettingsError, engine.RuleFileError)
+
+    def __init__(self, paths: Sequence[str], chosen: Chosen, jobs: int = 1) -> None:
+        super().__init__(paths, partial(_judge, chosen.pack, chosen.settings))
+        self._chosen = chosen
+        self._jobs = jobs
         self._worst = -1
+        self._unwritten = False
 
-    def verdict(self, fail_on: Severity) -> int:
+    def results(self) -> Iterator[Checked]:
+        """Yield each file less what the user has set aside; then say which settings are of no use."""
+        policy = self._chosen.policy
+        for file, findings, _ in super().results():
+            counting, aside = policy.apply(file, findings)
+            self._worst = max([self._worst, *(each.severity.rank for each in counting)])
+            yield Checked(file, counting, aside)
+        if self._interrupted:
+            return
+        for text in policy.remarks():
+            self.remarks.append(Remark(text))
+            complain(sentence(text))
+        self._write_baseline()
+
+    def exit_code(self) -> int:
         """Return the exit code once the results are used up: findings count only when all was read."""
-        code = self.exit_code()
-        return FINDINGS if code == DONE and self._worst >= fail_on.rank else code
+        code = super().exit_code()
+        if code == DONE and self._unwritten:
+            return FAILED
+        return FINDINGS if code == DONE and self._worst >= self._chosen.fail_on.rank else code
 
-    def _judge(self, path: str, advance: Advance | None) -> tuple[Checked, int]:
+    def outcomes(self, files: Sequence[str]) -> Iterator[tuple[str, Any]]:
+        """Judge one file after the other, or several at once; standard input only here."""
+        if self._jobs == 1 or len(files) < 2 or "-" in files:
+            yield from super().outcomes(files)
+            return
+        from mavframecheck.engine.jobs import read_files
+
+        with Progress(len(files)).together(files) as done:
+            for path, outcome in read_files(files, self._read, self._jobs):
+                done(path)
+                yield path, outcome
+
+    def _write_baseline(self) -> None:
+        """Write the baseline if it was asked for and all was seen that it is about."""
+        baseline = self._chosen.baseline
+        if baseline is None:
+            return
+        self._unwritten = True
+        if self._unreadable:
+            complain("the baseline is not written: not every file could be read")
+            return
         try:
-            checked = Checked(*engine.check_file(path, self._pack, self._settings, advance))
-        except (engine.SettingsError, engine.RuleFileError) as error:
-            raise click.UsageError(sentence(str(error))) from error
-        self._worst = max([self._worst, *(each.severity.rank for each in checked.findings)])
-        return checked, checked.file.messages
+            entries = baseline.write(self._chosen.policy.judged)
+        except OSError as error:
+            complain(sentence(f"{baseline.file}: cannot be written: {error.strerror}"))
+        else:
+            self._unwritten = False
+            complain(sentence(f"{baseline.file}: now {entries} known findings"))
+
+
+def _judge(
+    pack: engine.Pack, settings: engine.Settings, path: str, advance: Advance | None
+) -> tuple[Checked, int]:
+    """Judge one file, in whatever process."""
+    checked = Checked(*engine.check_file(path, pack, settings, advance))
+    return checked, checked.file.messages

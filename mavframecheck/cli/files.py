@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import click
 
 from mavframecheck.cli.output import complain
 from mavframecheck.cli.progress import Progress
+from mavframecheck.report import Remark
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.words import plural
 from mavframecheck.sources import NoRecordingError, SourceError, expand
@@ -25,6 +26,9 @@ Read = Callable[[str, Advance | None], tuple[Result, int]]
 class Files(Generic[Result]):
     """The files of one command, what reads each, and what is needed to choose its exit code."""
 
+    usage_errors: tuple[type[Exception], ...] = (DialectError,)
+    """What no file is to blame for."""
+
     def __init__(self, paths: Sequence[str], read: Read[Result]) -> None:
         self._paths = paths
         self._read = read
@@ -32,17 +36,25 @@ class Files(Generic[Result]):
         self._refused = 0
         self._frames = 0
         self._interrupted = False
+        self.remarks: list[Remark] = []
+        """Files that could not be read, and why."""
 
     def results(self) -> Iterator[Result]:
         """Yield what each file gives; Ctrl-C ends the list, and what is done is shown."""
-        files = self._files()
-        progress = Progress(len(files))
         try:
-            for path in files:
-                yield from self._one(path, progress)
+            for path, outcome in self.outcomes(self._files()):
+                yield from self._one(path, outcome)
         except KeyboardInterrupt:
             self._interrupted = True
             complain("interrupted: what follows is not all")
+
+    def outcomes(self, files: Sequence[str]) -> Iterator[tuple[str, Any]]:
+        """Yield each path with what `read` returns of it, or with the exception that it raises."""
+        progress = Progress(len(files))
+        for path in files:
+            with progress.of(path) as advance:
+                outcome = _attempt(self._read, path, advance)
+            yield path, outcome
 
     def exit_code(self) -> int:
         """Return the exit code once the results are used up."""
@@ -69,17 +81,17 @@ class Files(Generic[Result]):
             files.update((str(each), None) for each in found.recordings)
         return list(files)
 
-    def _one(self, path: str, progress: Progress) -> Iterator[Result]:
-        try:
-            with progress.of(path) as advance:
-                result, frames = self._read(path, advance)
-        except DialectError as error:
-            raise click.UsageError(sentence(str(error))) from error
-        except (SourceError, OSError) as error:
-            self._fail(path, error)
-            return
-        self._frames += frames
-        yield result
+    def _one(self, path: str, outcome: Any) -> Iterator[Result]:
+        if isinstance(outcome, self.usage_errors):
+            raise click.UsageError(sentence(str(outcome))) from outcome
+        if isinstance(outcome, SourceError | OSError):
+            self._fail(path, outcome)
+        elif isinstance(outcome, Exception):
+            raise outcome
+        else:
+            result, frames = outcome
+            self._frames += frames
+            yield result
 
     def _fail(self, path: str, error: SourceError | OSError) -> None:
         """Say which file cannot be read and why; the message may name it already."""
@@ -88,4 +100,12 @@ class Files(Generic[Result]):
         else:
             self._unreadable += 1
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        self.remarks.append(Remark(reason, path))
         complain(sentence(reason if path in reason else f"{path}: {reason}"))
+
+
+def _attempt(read: Read[Any], path: str, advance: Advance | None) -> Any:
+    try:
+        return read(path, advance)
+    except Exception as error:  # noqa: BLE001  (the one who asked for it decides)
+        return error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -47,6 +47,25 @@ class Progress:
         finally:
             if bar is not None:
                 bar.stop()
+
+    @contextmanager
+    def together(self, paths: Sequence[str]) -> Iterator[Callable[[str], None]]:
+        """Give the function to call with each file that is done, for files judged at the same time."""
+        if not sys.stderr.isatty():
+            yield lambda _path: None
+            return
+        sizes = {path: _size(path) or 0 for path in paths}
+        bar = _bar(f"0/{len(paths)}", sum(sizes.values()))
+
+        def done(path: str) -> None:
+            self._number += 1
+            title = f"{self._number}/{self._files}"
+            bar.update(bar.task_ids[0], advance=sizes[path], description=title)
+
+        try:
+            yield done
+        finally:
+            bar.stop()
 
     def _title(self, path: str) -> str:
         number = f"{self._number}/{self._files} " if self._files > 1 else ""

@@ -26,6 +26,7 @@ from mavframecheck.model.rule import (
     SeverityWhen,
     Status,
     Step,
+    setting,
 )
 
 __all__ = [
@@ -52,4 +53,5 @@ __all__ = [
     "Subject",
     "Suppressed",
     "Vehicle",
+    "setting",
 ]
