@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from mavframecheck.cli.output import deliver, echo, lines, page_context, parse_outputs
 from mavframecheck.cli.settings import choose, settings_options, shown
 from mavframecheck.report import FORMATS
+
+if TYPE_CHECKING:
+    from mavframecheck.cli.audit import Audit
+    from mavframecheck.cli.settings import Chosen
 
 _EXAMPLE = """\
 Give a recording, a directory of them, or - for standard input. For example:
@@ -51,6 +55,12 @@ Give a recording, a directory of them, or - for standard input. For example:
     help="Judge this many files at once, each in a process of its own; 0: one for each processor.",
 )
 @click.option(
+    "--watch",
+    metavar="DIR",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="Judge recordings as they appear in this directory and are complete, until Ctrl-C.",
+)
+@click.option(
     "-v",
     "--verbose",
     is_flag=True,
@@ -67,6 +77,7 @@ def check(
     verbose: bool,
     show_settings: bool,
     jobs: int,
+    watch: Path | None,
     **options: Any,
 ) -> None:
     """Judge recordings and missions: files, directories, or - for standard input.
@@ -77,19 +88,29 @@ def check(
     if show_settings:
         echo(lines(shown(choose(**options))))
         return
-    if not paths:
+    if paths and watch:
+        raise click.UsageError("give either PATH or --watch DIR")
+    if not (paths or watch):
         click.echo(_EXAMPLE, err=True, nl=False)
         ctx.exit(2)
-    from mavframecheck.cli.audit import Audit
-
     chosen = choose(**options)
-    audit = Audit(paths, chosen, jobs or os.cpu_count() or 1)
+    audit = _audit(paths, watch, chosen, jobs or os.cpu_count() or 1)
     context = page_context(verbose=verbose)._replace(
         rules=tuple(chosen.pack.rules), fail_on=chosen.fail_on, remarks=audit.remarks
     )
     form = "statistics" if statistics else form or _default_format()
     deliver(audit.results(), form, outputs, context)
     ctx.exit(audit.exit_code())
+
+
+def _audit(paths: tuple[str, ...], watch: Path | None, chosen: Chosen, jobs: int) -> Audit:
+    if watch:
+        from mavframecheck.cli.vigil import Vigil
+
+        return Vigil(watch, chosen)
+    from mavframecheck.cli.audit import Audit
+
+    return Audit(paths, chosen, jobs)
 
 
 def _default_format() -> str:

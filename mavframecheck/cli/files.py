@@ -53,7 +53,7 @@ class Files(Generic[Result]):
         progress = Progress(len(files))
         for path in files:
             with progress.of(path) as advance:
-                outcome = _attempt(self._read, path, advance)
+                outcome = attempt(self._read, path, advance)
             yield path, outcome
 
     def exit_code(self) -> int:
@@ -104,7 +104,8 @@ class Files(Generic[Result]):
         complain(sentence(reason if path in reason else f"{path}: {reason}"))
 
 
-def _attempt(read: Read[Any], path: str, advance: Advance | None) -> Any:
+def attempt(read: Read[Any], path: str, advance: Advance | None) -> Any:
+    """Return what `read` returns, or the exception that it raises."""
     try:
         return read(path, advance)
     except Exception as error:  # noqa: BLE001  (the one who asked for it decides)

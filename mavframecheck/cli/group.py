@@ -12,13 +12,12 @@ from typing import Any
 
 import click
 
-from mavframecheck import __version__
-
 COMMANDS = {
     "check": "Judge recordings and missions; exit 1 on findings.",
     "inspect": "Show what the numbers of a recording mean: the map of its streams.",
     "rules": "List the rules.",
     "rule": "Explain one rule.",
+    "completion": "Write the script that makes a shell complete this command.",
 }
 """Name and one line of help. `mavframecheck.cli.NAME` holds the command, called NAME."""
 
@@ -60,8 +59,25 @@ def _internal_error(
     os._exit(2)
 
 
+def _show_versions(ctx: click.Context, _param: click.Parameter, value: bool) -> None:
+    if not value or ctx.resilient_parsing:
+        return
+    from mavframecheck.cli.version import versions
+
+    for line in versions():
+        click.echo(line)
+    ctx.exit()
+
+
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="mavframecheck")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_versions,
+    help="Show the versions of the program and of the data by which it judges.",
+)
 def main() -> None:
     """Find numbers in MAVLink streams that do not mean what somebody thinks.
 

@@ -11,6 +11,8 @@ import click
 from mavframecheck.report.escape import sentence
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from mavframecheck.engine import Pack
 
 Value: TypeAlias = float | str | bool
@@ -47,6 +49,21 @@ def load_rules(directories: Sequence[Path]) -> Pack:
         return load_pack(directories)
     except RuleFileError as error:
         raise click.UsageError(sentence(str(error))) from error
+
+
+def complete_codes(
+    _ctx: click.Context, _param: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Return the shipped rules whose code or name begins with what a shell wants completed."""
+    from click.shell_completion import CompletionItem
+
+    beginning = incomplete.lower()
+    return [
+        CompletionItem(word, help=rule.summary)
+        for rule in load_rules(()).rules
+        for word in (rule.code, rule.name)
+        if word.lower().startswith(beginning)
+    ]
 
 
 def listed(values: Iterable[str]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +20,15 @@ OWN = "mavframecheck.toml"
 SHARED = "pyproject.toml"
 TABLE = ("tool", "mavframecheck")
 """Where the settings are in a file that is shared with other tools."""
+_TYPES = {
+    "array": "a list",
+    "object": "a table",
+    "str": "text",
+    "bool": "true or false",
+    "int": "a whole number",
+    "float": "a number",
+}
+"""What msgspec calls types, and what they are for people."""
 
 
 def find_config(start: Path) -> Path | None:
@@ -124,8 +134,10 @@ def _strange(
 
 
 def _in_words(message: str) -> str:
-    """Return msgspec's ``Expected `bool`, got `str` - at `$.preview``` as key and reason."""
-    reason, _, place = message.replace("`", "").partition(" - at ")
+    """Return msgspec's ``Expected `array`, got `str` - at `$.select``` in words of TOML, the key first."""
+    reason, _, place = message.replace("`", "").replace(" | null", "").partition(" - at ")
+    for word, toml in _TYPES.items():
+        reason = re.sub(rf"\b{word}\b", toml, reason)
     return f"{place.removeprefix('$.')}: {reason[:1].lower()}{reason[1:]}" if place else reason
 
 
