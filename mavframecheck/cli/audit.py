@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -50,7 +50,7 @@ class Audit(Files[Checked]):
             return FAILED
         return FINDINGS if code == DONE and self._worst >= self._chosen.fail_on.rank else code
 
-    def outcomes(self, files: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    def outcomes(self, files: Sequence[str]) -> Generator[tuple[str, Any]]:
         """Judge one file after the other, or several at once; standard input only here."""
         if self._jobs == 1 or len(files) < 2 or "-" in files:
             yield from super().outcomes(files)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
 from typing import Any, Generic, TypeVar
 
 import click
 
+from mavframecheck.cli.interrupts import Interrupts
 from mavframecheck.cli.output import complain
 from mavframecheck.cli.progress import Progress
 from mavframecheck.report import Remark
@@ -41,14 +43,24 @@ class Files(Generic[Result]):
 
     def results(self) -> Iterator[Result]:
         """Yield what each file gives; Ctrl-C ends the list, and what is done is shown."""
-        try:
-            for path, outcome in self.outcomes(self._files()):
-                yield from self._one(path, outcome)
-        except KeyboardInterrupt:
-            self._interrupted = True
-            complain("interrupted: what follows is not all")
+        with Interrupts() as interrupts, closing(self.outcomes(self._files())) as outcomes:
+            while True:
+                try:
+                    with interrupts.reading():
+                        read = next(outcomes, None)
+                except KeyboardInterrupt:
+                    self.stopped()
+                    return
+                if read is None:
+                    return
+                yield from self._one(*read)
 
-    def outcomes(self, files: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    def stopped(self) -> None:
+        """Take note that Ctrl-C ended the run before its last file."""
+        self._interrupted = True
+        complain("interrupted: what follows is not all")
+
+    def outcomes(self, files: Sequence[str]) -> Generator[tuple[str, Any]]:
         """Yield each path with what `read` returns of it, or with the exception that it raises."""
         progress = Progress(len(files))
         for path in files:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +29,15 @@ class Vigil(Audit):
         """Return nothing: what is there already is left alone."""
         return []
 
-    def outcomes(self, _files: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    def outcomes(self, _files: Sequence[str]) -> Generator[tuple[str, Any]]:
         """Judge each recording once it is complete."""
         arrivals = Arrivals(self._directory)
         complain(f"watching {sentence(str(self._directory))} for new recordings; Ctrl-C ends it")
-        try:
-            while True:
-                for path in arrivals.complete(time.monotonic()):
-                    yield str(path), attempt(self._read, str(path), None)
-                time.sleep(POLL_S)
-        except KeyboardInterrupt:
-            complain("end of the watch")
+        while True:
+            for path in arrivals.complete(time.monotonic()):
+                yield str(path), attempt(self._read, str(path), None)
+            time.sleep(POLL_S)
+
+    def stopped(self) -> None:
+        """Take note of the way in which every watch ends."""
+        complain("end of the watch")

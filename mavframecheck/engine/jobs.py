@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -22,7 +22,7 @@ class _Stopped(Exception):  # noqa: N818  (nobody catches it)
     """The run is over; what a process is still reading is of no use."""
 
 
-def read_files(paths: Sequence[str], read: Read, jobs: int) -> Iterator[tuple[str, Any]]:
+def read_files(paths: Sequence[str], read: Read, jobs: int) -> Generator[tuple[str, Any]]:
     """Yield each path with what `read` returns of it, or with the exception that it raises.
 
     When the caller stops, or an exception such as Ctrl-C ends the wait, the processes stop at their

@@ -46,7 +46,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, rename="kebab", forbid_u
     """Baseline file, from the folder of the configuration file."""
     severity: dict[str, Severity] = {}
     """Rule to the severity of all its findings."""
-    params: dict[str, dict[str, float | str | bool]] = {}
+    params: dict[str, dict[str, int | float | str | bool]] = {}
     """Rule to parameter to value."""
     per_file_ignores: dict[str, Codes] = {}
     """Pattern for the path to rules."""
