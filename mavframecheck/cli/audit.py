@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mavframecheck import engine
 from mavframecheck.cli.files import DONE, FAILED, Advance, Files
@@ -13,6 +13,10 @@ from mavframecheck.cli.progress import Progress
 from mavframecheck.cli.settings import Chosen
 from mavframecheck.report import Checked, Remark
 from mavframecheck.report.escape import sentence
+
+if TYPE_CHECKING:
+    from mavframecheck.engine.baseline import Baseline, Judged
+    from mavframecheck.engine.policy import Policy
 
 FINDINGS = 1
 
@@ -32,16 +36,15 @@ class Audit(Files[Checked]):
     def results(self) -> Iterator[Checked]:
         """Yield each file less what the user has set aside; then say which settings are of no use."""
         policy = self._chosen.policy
-        for file, findings, _ in super().results():
-            counting, aside = policy.apply(file, findings)
-            self._worst = max([self._worst, *(each.severity.rank for each in counting)])
-            yield Checked(file, counting, aside)
-        if self._interrupted:
-            return
-        for text in policy.remarks():
-            self.remarks.append(Remark(text))
-            complain(sentence(text))
-        self._write_baseline()
+        for checked in super().results():
+            result = checked
+            if policy is not None:
+                counting, aside = policy.apply(checked.file, checked.findings)
+                result = checked._replace(findings=counting, suppressed=aside)
+            self._worst = max([self._worst, *(each.severity.rank for each in result.findings)])
+            yield result
+        if policy is not None and not self._interrupted:
+            self._finish(policy)
 
     def exit_code(self) -> int:
         """Return the exit code once the results are used up: findings count only when all was read."""
@@ -62,17 +65,21 @@ class Audit(Files[Checked]):
                 done(path)
                 yield path, outcome
 
-    def _write_baseline(self) -> None:
-        """Write the baseline if it was asked for and all was seen that it is about."""
-        baseline = self._chosen.baseline
-        if baseline is None:
-            return
+    def _finish(self, policy: Policy) -> None:
+        for text in policy.remarks():
+            self.remarks.append(Remark(text))
+            complain(sentence(text))
+        if self._chosen.baseline is not None:
+            self._write(self._chosen.baseline, policy.judged)
+
+    def _write(self, baseline: Baseline, judged: Judged) -> None:
+        """Write the baseline if all was seen that it is about."""
         self._unwritten = True
         if self._unreadable:
             complain("the baseline is not written: not every file could be read")
             return
         try:
-            entries = baseline.write(self._chosen.policy.judged)
+            entries = baseline.write(judged)
         except OSError as error:
             complain(sentence(f"{baseline.file}: cannot be written: {error.strerror}"))
         else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterator, Mapping
 from datetime import date
@@ -109,7 +108,8 @@ class Chosen(NamedTuple):
 
     pack: Pack
     settings: Settings
-    policy: Policy
+    policy: Policy | None
+    """None where neither a configuration file nor a baseline says anything of findings."""
     baseline: Baseline | None
     """The one to write again, None unless asked for."""
     fail_on: Severity
@@ -133,7 +133,6 @@ def choose(
     """Return what holds; a mistake in the file or on the command line is a usage error."""
     from mavframecheck.engine import Settings, SettingsError
     from mavframecheck.engine.config import find_config, read_config, resolve
-    from mavframecheck.engine.policy import Policy
 
     try:
         source = config_file or (None if isolated else find_config(Path.cwd()))
@@ -156,9 +155,15 @@ def choose(
         overrides=config.params,
         **({"dialect": config.dialect} if config.dialect else {}),
     )
-    policy = Policy(config, folder, known)
+    policy = _policy(config, folder, known) if source or known else None
     written = known if update_baseline else None
     return Chosen(pack, settings, policy, written, config.fail_on, config, source)
+
+
+def _policy(config: Config, folder: Path, baseline: Baseline | None) -> Policy:
+    from mavframecheck.engine.policy import Policy
+
+    return Policy(config, folder, baseline)
 
 
 def _with_options(
@@ -235,4 +240,4 @@ def _toml(value: object) -> str:
         return f"{{{inner}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_toml, value))}]"
-    return value.isoformat() if isinstance(value, date) else json.dumps(value)
+    return value.isoformat() if isinstance(value, date) else msgspec.json.encode(value).decode()

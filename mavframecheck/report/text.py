@@ -20,7 +20,6 @@ from mavframecheck.model import (
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.layout import SEVERITY_COLOURS, Page
-from mavframecheck.report.statistics import by_rule
 from mavframecheck.report.verdict import Census, found, judged
 from mavframecheck.report.words import (
     component,
@@ -52,6 +51,8 @@ def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
 
 def _all(census: Census, page: Page) -> Iterator[str]:
     """Yield which rule found something in how many files, and the verdict on all of them."""
+    from mavframecheck.report.statistics import by_rule
+
     yield ""
     yield from by_rule(census, page)
     yield page.bold(census.total)
