@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -44,15 +43,15 @@ def read_files(paths: Sequence[str], read: Read, jobs: int) -> Generator[tuple[s
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Ignore Ctrl-C while processes begin: they inherit that, and only the caller answers to it."""
-    if threading.current_thread() is not threading.main_thread():
+    """Hold back Ctrl-C while processes begin: they inherit that, and the caller hears it afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _outcome(path: str, future: Future[Any]) -> Any:

@@ -16,7 +16,7 @@ def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
     page, census = Page(context), Census()
     for checked in census.count(results):
         yield "".join(f"{_line(finding, page)}\n" for finding in checked.findings)
-    yield f"{page.bold(census.total)}; {judged(census.files)}\n"
+    yield f"{page.bold(census.total)}; {judged(census.files, verbose=True)}\n"
 
 
 def _line(finding: Finding, page: Page) -> str:

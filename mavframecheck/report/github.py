@@ -28,7 +28,7 @@ def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
     for remark in context.remarks:
         where = {"file": shown(remark.path)} if remark.path is not None else {}
         yield command("error" if where else "warning", remark.text, {"title": "not judged"} | where)
-    yield f"{census.total}\n{judged(census.files)}\n"
+    yield f"{census.total}\n{judged(census.files, verbose=True)}\n"
 
 
 def _level(findings: Sequence[Finding], severity: Severity) -> Iterator[str]:

@@ -18,7 +18,7 @@ def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
     page, census = Page(context), Census()
     for checked in results:
         census.add(checked)
-    lines = [*by_rule(census, page), page.bold(census.total), judged(census.files)]
+    lines = [*by_rule(census, page), page.bold(census.total), judged(census.files, verbose=True)]
     yield "".join(f"{line}\n" for line in lines)
 
 

@@ -81,7 +81,7 @@ def found(severities: Counter[Severity], suppressed: int = 0) -> str:
 
 
 def judged(files: Sequence[FileReport], *, verbose: bool = False) -> str:
-    """Return how much was judged, and by what idea of the vehicle."""
+    """Return how much was judged, and by what idea of the vehicle; `verbose` says all there is to say."""
     ends = Counter(verdicts(chain.from_iterable(file.runs for file in files)).values())
     idle = ends["not-applicable"] + ends["insufficient-data"]
     checksums = sum(file.bad_crc for file in files)

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -66,10 +65,8 @@ def test_ctrl_c_reports_what_is_done(jobs: str, tmp_path: Path) -> None:
         first = process.stdout.readline()
         assert process.stdout.readline().startswith(b'{"type":"file","path":"'), "the file is done"
         os.killpg(process.pid, signal.SIGINT)
-        asked = time.monotonic()
         rest, complaints = process.communicate()
     assert first.startswith(b'{"type":"finding"')
     assert rest.count(b'{"type":"file"') < 2
     assert complaints == b"mavframecheck: interrupted: what follows is not all\n"
     assert process.returncode == 130
-    assert time.monotonic() - asked < 60

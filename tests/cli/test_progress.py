@@ -56,3 +56,17 @@ def test_bar_names_the_file_and_disappears(monkeypatch: pytest.MonkeyPatch, tmp_
             advance(50)
         assert rf"{number} a[red]\x1b[2J.tlog" in watched.getvalue()
     assert "\x1b[2J" not in watched.getvalue()
+
+
+def test_files_judged_at_once_share_a_bar(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """It counts files and bytes, and is gone in the end; in a pipe there is none."""
+    paths = [str(tmp_path / name) for name in ("a.tlog", "gone.tlog")]
+    Path(paths[0]).write_bytes(bytes(100))
+    with Progress(2).together(paths) as done:
+        done(paths[0])
+    watched = watch(monkeypatch)
+    with Progress(2).together(paths) as done:
+        for path in paths:
+            done(path)
+    assert "2/2" in watched.getvalue()
+    assert "100/100 bytes" in watched.getvalue()
