@@ -8,6 +8,7 @@ from typing import Any, Generic, TypeVar
 
 import click
 
+from mavframecheck.cli.group import INTERRUPTED
 from mavframecheck.cli.interrupts import Interrupts
 from mavframecheck.cli.output import complain
 from mavframecheck.cli.progress import Progress
@@ -17,7 +18,7 @@ from mavframecheck.report.words import plural
 from mavframecheck.sources import NoRecordingError, SourceError, expand
 from mavframecheck.wire import DialectError
 
-DONE, FAILED, NOTHING, INTERRUPTED = 0, 2, 3, 130
+DONE, FAILED, NOTHING = 0, 2, 3
 
 Result = TypeVar("Result")
 Advance = Callable[[int], None]

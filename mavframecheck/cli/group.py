@@ -22,6 +22,8 @@ COMMANDS = {
 """Name and one line of help. `mavframecheck.cli.NAME` holds the command, called NAME."""
 
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C: 128 and the number of the signal."""
 COLLECT_AFTER = 200_000
 """Objects made before the garbage collector looks: what start-up makes stays, and looking takes 0.1 s."""
 
@@ -41,6 +43,14 @@ class _Lazy(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the subcommand; click itself would leave with 1 on Ctrl-C, the code for findings."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("mavframecheck: interrupted", err=True)
+            ctx.exit(INTERRUPTED)
 
     def main(self, args: Sequence[str] | None = None, *rest: Any, **extra: Any) -> Any:
         """Run the command; as a process of its own (no `args`), also answer for its failures."""
