@@ -13,6 +13,7 @@ from mavframecheck.cli.progress import Progress
 from mavframecheck.cli.settings import Chosen
 from mavframecheck.report import Checked, Remark
 from mavframecheck.report.escape import sentence
+from mavframecheck.report.words import plural
 
 if TYPE_CHECKING:
     from mavframecheck.engine.baseline import Baseline, Judged
@@ -60,10 +61,8 @@ class Audit(Files[Checked]):
             return
         from mavframecheck.engine.jobs import read_files
 
-        with Progress(len(files)).together(files) as done:
-            for path, outcome in read_files(files, self._read, self._jobs):
-                done(path)
-                yield path, outcome
+        outcomes = read_files(files, self._read, self._jobs)
+        yield from Progress(len(files)).together(outcomes, files)
 
     def _finish(self, policy: Policy) -> None:
         for text in policy.remarks():
@@ -84,7 +83,7 @@ class Audit(Files[Checked]):
             complain(sentence(f"{baseline.file}: cannot be written: {error.strerror}"))
         else:
             self._unwritten = False
-            complain(sentence(f"{baseline.file}: now {entries} known findings"))
+            complain(sentence(f"{baseline.file}: now {plural(entries, 'known finding')}"))
 
 
 def _judge(

@@ -36,9 +36,18 @@ def find_config(start: Path) -> Path | None:
     for folder in (start, *start.parents):
         if (folder / OWN).is_file():
             return folder / OWN
-        if (folder / SHARED).is_file() and _settings_in(_toml(folder / SHARED)) is not None:
+        if _has_settings(folder / SHARED):
             return folder / SHARED
     return None
+
+
+def _has_settings(file: Path) -> bool:
+    """Return whether a file that other tools share speaks of this one; else its mistakes are theirs."""
+    try:
+        named = TABLE[-1].encode() in file.read_bytes()
+    except OSError:
+        return False
+    return named and _settings_in(_toml(file)) is not None
 
 
 def read_config(file: Path) -> Config:

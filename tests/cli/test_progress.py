@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -58,15 +59,23 @@ def test_bar_names_the_file_and_disappears(monkeypatch: pytest.MonkeyPatch, tmp_
     assert "\x1b[2J" not in watched.getvalue()
 
 
-def test_files_judged_at_once_share_a_bar(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """It counts files and bytes, and is gone in the end; in a pipe there is none."""
+def outcomes(paths: list[str]) -> Generator[tuple[str, int]]:
+    """Yield a result for each path."""
+    yield from ((path, number) for number, path in enumerate(paths))
+
+
+def test_files_judged_at_once_share_a_bar(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It counts files and bytes; what is written between results goes where it should."""
     paths = [str(tmp_path / name) for name in ("a.tlog", "gone.tlog")]
     Path(paths[0]).write_bytes(bytes(100))
-    with Progress(2).together(paths) as done:
-        done(paths[0])
+    assert [*Progress(2).together(outcomes(paths), paths)] == [*outcomes(paths)]
+    assert capsys.readouterr().err == ""
     watched = watch(monkeypatch)
-    with Progress(2).together(paths) as done:
-        for path in paths:
-            done(path)
-    assert "2/2" in watched.getvalue()
+    for path, _ in Progress(2).together(outcomes(paths), paths):
+        print(f"report on {path}")  # noqa: T201
+    assert "1/2" in watched.getvalue()
     assert "100/100 bytes" in watched.getvalue()
+    assert "report on" not in watched.getvalue()
+    assert capsys.readouterr().out.count("report on") == 2

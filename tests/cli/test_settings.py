@@ -92,7 +92,7 @@ def test_baseline_from_beginning_to_end(engine: FakeEngine, logs: Path, run: Run
     ran = made_up.file(path="a.tlog")
     engine.answers["a.tlog"] = Checked(ran, (made_up.finding(),))
     learn = run("check", "a.tlog", "--baseline", "known.json", "--update-baseline")
-    assert (learn.exit_code, "known.json: now 1 known findings" in learn.stderr) == (0, True)
+    assert (learn.exit_code, "known.json: now 1 known finding" in learn.stderr) == (0, True)
     assert run("check", "a.tlog", "--baseline", "known.json").exit_code == 0
     engine.answers["a.tlog"] = ERROR
     new = run("check", "a.tlog", "--baseline", "known.json", "--format", "concise")

@@ -77,11 +77,11 @@ def test_every_key_is_read(tmp_path: Path) -> None:
 
 
 def test_the_nearest_file_above_holds(tmp_path: Path) -> None:
-    """A pyproject.toml counts only with our table in it."""
+    """A pyproject.toml counts only with our table in it; a mistake in another's is not ours."""
     inner = tmp_path / "a" / "b"
     inner.mkdir(parents=True)
     written(tmp_path, "preview = true")
-    written(inner, "[tool.other]", "pyproject.toml")
+    written(inner, "[tool.other", "pyproject.toml")
     assert find_config(inner) == tmp_path / "mavframecheck.toml"
     own = written(tmp_path / "a", "[tool.mavframecheck]\npreview = true", "pyproject.toml")
     assert find_config(inner) == own
