@@ -9,12 +9,14 @@ from typing import Any
 import jsonschema
 import pytest
 
+from mavframecheck.engine import Settings, check_file, load_pack
 from mavframecheck.model import Suppressed
 from mavframecheck.report import Checked, Context, Remark
 from mavframecheck.report.sarif import FINGERPRINT, render
 from tests.report import made_up
 
 SCHEMA = json.loads((Path(__file__).parent / "schemas" / "sarif-2.1.0.json").read_bytes())
+SAMPLES = Path(__file__).parents[2] / "samples"
 CONTEXT = Context("0.1.0", rules=made_up.rules())
 MISSION = Checked(made_up.file(path="m.plan"), (made_up.mission_item(),))
 ASIDE = Suppressed(finding=made_up.finding(), by="configuration", reason="known since May")
@@ -47,6 +49,17 @@ def test_every_made_up_report_is_valid() -> None:
     assert len(invocation["toolConfigurationNotifications"]) == 1
     place = invocation["toolExecutionNotifications"][0]["locations"][0]["physicalLocation"]
     assert place["artifactLocation"]["uri"] == "gone%FF.tlog"
+
+
+def test_shipped_rules_and_a_real_recording_are_valid() -> None:
+    """All that the rule files say passes too, and every finding points at its rule."""
+    pack = load_pack()
+    checked = Checked(*check_file(str(SAMPLES / "damaged_link.tlog"), pack, Settings()))
+    run = written(checked, context=CONTEXT._replace(rules=pack.rules, verbose=True))
+    rules = run["tool"]["driver"]["rules"]
+    assert [rule["id"] for rule in rules] == [rule.code for rule in pack.rules]
+    assert all(rule["help"]["markdown"] for rule in rules)
+    assert all(rules[each["ruleIndex"]]["id"] == each["ruleId"] for each in run["results"])
 
 
 def test_a_finding_says_where_it_is() -> None:
