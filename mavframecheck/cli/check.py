@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mavframecheck.cli.options import (
-    dialect_option,
-    input_kind_option,
-    load_rules,
-    overrides,
-    rules_option,
-    selected,
-)
-from mavframecheck.cli.output import echo, page_context
-from mavframecheck.model import Severity
-from mavframecheck.report import FORMATS, load
+from mavframecheck.cli.output import deliver, echo, lines, page_context, parse_outputs
+from mavframecheck.cli.settings import choose, settings_options, shown
+from mavframecheck.report import FORMATS
 
 if TYPE_CHECKING:
-    from mavframecheck.engine import Pack, Settings
+    from mavframecheck.cli.audit import Audit
+    from mavframecheck.cli.settings import Chosen
 
 _EXAMPLE = """\
 Give a recording, a directory of them, or - for standard input. For example:
@@ -31,7 +25,6 @@ Give a recording, a directory of them, or - for standard input. For example:
 
 'mavframecheck check --help' lists every option.
 """
-_FAMILIES = ("px4", "arducopter", "arduplane", "ardurover", "ardusub")
 
 
 @click.command()
@@ -40,40 +33,33 @@ _FAMILIES = ("px4", "arducopter", "arduplane", "ardurover", "ardusub")
     "--format",
     "form",
     type=click.Choice(list(FORMATS)),
-    default="text",
-    show_default=True,
-    help="text is for people; json and jsonl are described in docs/output.md.",
+    help="text, concise and statistics are for people, the others are described in docs/output.md."
+    "  [default: text; github in GitHub Actions]",
 )
+@click.option("--statistics", is_flag=True, help="Count findings by rule instead of showing each.")
 @click.option(
-    "--select",
-    metavar="CODES",
+    "--output",
+    "outputs",
+    metavar="FORMAT=PATH",
     multiple=True,
-    help="Run only these codes, prefixes or names: MFC1,MFC302. Repeatable.",
+    callback=parse_outputs,
+    help="Also write a report in this format to this file. Repeatable: one pass gives several.",
 )
-@click.option("--ignore", metavar="CODES", multiple=True, help="Leave these out. Repeatable.")
+@settings_options
 @click.option(
-    "--fail-on",
-    type=click.Choice([severity.value for severity in Severity]),
-    default=Severity.WARNING.value,
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=1,
     show_default=True,
-    help="Exit 1 when a finding is at least this bad.",
+    help="Judge this many files at once, each in a process of its own; 0: one for each processor.",
 )
-@click.option("--preview", is_flag=True, help="Also run rules that are still on trial.")
 @click.option(
-    "--autopilot",
-    type=click.Choice(_FAMILIES),
-    help="What the vehicle is, where the recording does not say.",
+    "--watch",
+    metavar="DIR",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="Judge recordings as they appear in this directory and are complete, until Ctrl-C.",
 )
-@dialect_option
-@input_kind_option
-@click.option(
-    "--set",
-    "assignments",
-    metavar="CODE.param=value",
-    multiple=True,
-    help="Change a parameter of a rule ('mavframecheck rule CODE' lists them). Repeatable.",
-)
-@rules_option
 @click.option(
     "-v",
     "--verbose",
@@ -85,42 +71,48 @@ def check(
     ctx: click.Context,
     /,
     paths: tuple[str, ...],
-    form: str,
-    fail_on: str,
-    directories: tuple[Path, ...],
+    form: str | None,
+    statistics: bool,
+    outputs: list[tuple[str, Path]],
     verbose: bool,
-    **chosen: Any,
+    show_settings: bool,
+    jobs: int,
+    watch: Path | None,
+    **options: Any,
 ) -> None:
     """Judge recordings and missions: files, directories, or - for standard input.
 
     Exit codes: 0 clean, 1 findings at or above --fail-on, 2 wrong usage or a file that cannot be
     read, 3 nothing could be decoded.
     """
-    if not paths:
+    if show_settings:
+        echo(lines(shown(choose(**options))))
+        return
+    if paths and watch:
+        raise click.UsageError("give either PATH or --watch DIR")
+    if not (paths or watch):
         click.echo(_EXAMPLE, err=True, nl=False)
         ctx.exit(2)
+    chosen = choose(**options)
+    audit = _audit(paths, watch, chosen, jobs or os.cpu_count() or 1)
+    context = page_context(verbose=verbose)._replace(
+        rules=tuple(chosen.pack.rules), fail_on=chosen.fail_on, remarks=audit.remarks
+    )
+    form = "statistics" if statistics else form or _default_format()
+    deliver(audit.results(), form, outputs, context)
+    ctx.exit(audit.exit_code())
+
+
+def _audit(paths: tuple[str, ...], watch: Path | None, chosen: Chosen, jobs: int) -> Audit:
+    if watch:
+        from mavframecheck.cli.vigil import Vigil
+
+        return Vigil(watch, chosen)
     from mavframecheck.cli.audit import Audit
 
-    pack = load_rules(directories)
-    audit = Audit(paths, pack, _settings(pack, **chosen))
-    context = page_context(verbose=verbose)._replace(rules=tuple(pack.rules))
-    echo(load(form)(audit.results(), context))
-    ctx.exit(audit.verdict(Severity(fail_on)))
+    return Audit(paths, chosen, jobs)
 
 
-def _settings(
-    pack: Pack,
-    select: tuple[str, ...],
-    ignore: tuple[str, ...],
-    assignments: tuple[str, ...],
-    **rest: Any,
-) -> Settings:
-    """Return the settings of the engine, every code and parameter known to exist."""
-    from mavframecheck.engine import Settings
-
-    return Settings(
-        select=selected("--select", select, pack),
-        ignore=selected("--ignore", ignore, pack),
-        overrides=overrides(assignments, pack),
-        **rest,
-    )
+def _default_format() -> str:
+    """Return the format that whoever reads standard output understands best."""
+    return "github" if os.environ.get("GITHUB_ACTIONS") == "true" else "text"

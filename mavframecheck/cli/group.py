@@ -12,17 +12,18 @@ from typing import Any
 
 import click
 
-from mavframecheck import __version__
-
 COMMANDS = {
     "check": "Judge recordings and missions; exit 1 on findings.",
     "inspect": "Show what the numbers of a recording mean: the map of its streams.",
     "rules": "List the rules.",
     "rule": "Explain one rule.",
+    "completion": "Write the script that makes a shell complete this command.",
 }
 """Name and one line of help. `mavframecheck.cli.NAME` holds the command, called NAME."""
 
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C: 128 and the number of the signal."""
 COLLECT_AFTER = 200_000
 """Objects made before the garbage collector looks: what start-up makes stays, and looking takes 0.1 s."""
 
@@ -43,6 +44,14 @@ class _Lazy(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the subcommand; click itself would leave with 1 on Ctrl-C, the code for findings."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("mavframecheck: interrupted", err=True)
+            ctx.exit(INTERRUPTED)
+
     def main(self, args: Sequence[str] | None = None, *rest: Any, **extra: Any) -> Any:
         """Run the command; as a process of its own (no `args`), also answer for its failures."""
         if args is None:
@@ -60,8 +69,25 @@ def _internal_error(
     os._exit(2)
 
 
+def _show_versions(ctx: click.Context, _param: click.Parameter, value: bool) -> None:
+    if not value or ctx.resilient_parsing:
+        return
+    from mavframecheck.cli.version import versions
+
+    for line in versions():
+        click.echo(line)
+    ctx.exit()
+
+
 @click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="mavframecheck")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_versions,
+    help="Show the versions of the program and of the data by which it judges.",
+)
 def main() -> None:
     """Find numbers in MAVLink streams that do not mean what somebody thinks.
 

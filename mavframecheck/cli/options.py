@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 import click
 
-from mavframecheck.model import Rule
 from mavframecheck.report.escape import sentence
-from mavframecheck.report.words import setting
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from mavframecheck.engine import Pack
 
 Value: TypeAlias = float | str | bool
@@ -27,12 +26,13 @@ rules_option = click.option(
     help="Also use the rule files in this directory. Repeatable.",
 )
 
+DIALECT_HELP = "MAVLink dialect of the recording."
 dialect_option = click.option(
     "--dialect",
     metavar="NAME|FILE.xml",
     default="ardupilotmega",
     show_default=True,
-    help="MAVLink dialect of the recording.",
+    help=DIALECT_HELP,
 )
 input_kind_option = click.option(
     "--input-kind",
@@ -51,78 +51,55 @@ def load_rules(directories: Sequence[Path]) -> Pack:
         raise click.UsageError(sentence(str(error))) from error
 
 
+def complete_codes(
+    _ctx: click.Context, _param: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Return the shipped rules whose code or name begins with what a shell wants completed."""
+    from click.shell_completion import CompletionItem
+
+    beginning = incomplete.lower()
+    return [
+        CompletionItem(word, help=rule.summary)
+        for rule in load_rules(()).rules
+        for word in (rule.code, rule.name)
+        if word.lower().startswith(beginning)
+    ]
+
+
+def listed(values: Iterable[str]) -> list[str]:
+    """Return what is separated by commas, or given several times."""
+    return [word.strip() for value in values for word in value.split(",") if word.strip()]
+
+
 def selected(option: str, values: Iterable[str], pack: Pack) -> tuple[str, ...]:
-    """Return the codes and prefixes in `values` (separated by commas, or several); names count."""
-    words = [word.strip() for value in values for word in value.split(",") if word.strip()]
-    return tuple(_selector(option, word, pack) for word in words)
+    """Return the codes and prefixes in `values`; names count."""
+    from mavframecheck.engine import SettingsError, selectors
 
-
-def _selector(option: str, word: str, pack: Pack) -> str:
-    if any(rule.code.startswith(word.upper()) for rule in pack.rules):
-        return word.upper()
-    for rule in pack.rules:
-        if rule.name == word.lower():
-            return rule.code
-    known = [text for rule in pack.rules for text in (rule.code, rule.name)]
-    raise click.BadParameter(
-        f"no rule has the code or prefix '{word}'. {similar(word, known)}", param_hint=option
-    )
+    try:
+        return selectors(listed(values), pack)
+    except SettingsError as error:
+        raise click.BadParameter(sentence(str(error)), param_hint=option) from error
 
 
 def overrides(assignments: Iterable[str], pack: Pack) -> dict[str, dict[str, Value]]:
     """Return code to parameter to value, from ``CODE.param=value`` typed like the rule's own."""
     result: dict[str, dict[str, Value]] = {}
     for assignment in assignments:
-        target, equals, text = assignment.partition("=")
-        code, dot, name = target.strip().partition(".")
-        if not (equals and dot):
-            raise _bad_set(f"'{assignment}' is not CODE.param=value")
-        rule = _rule(code, pack)
-        result.setdefault(rule.code, {})[name] = _typed(rule, name, text.strip())
+        code, name, value = _assigned(assignment, pack)
+        result.setdefault(code, {})[name] = value
     return result
 
 
-def _rule(code: str, pack: Pack) -> Rule:
-    rule = pack.by_code.get(code.upper())
-    if rule is None:
-        adjustable = [each.code for each in pack.rules if each.params]
-        raise _bad_set(
-            f"there is no rule {code}. {similar(code.upper(), adjustable)} Rules with parameters: {', '.join(adjustable) or 'none'}."
-        )
-    return rule
+def _assigned(assignment: str, pack: Pack) -> tuple[str, str, Value]:
+    from mavframecheck.engine import SettingsError, parameter
 
-
-def _typed(rule: Rule, name: str, text: str) -> Value:
-    """Return `text` as the type that the parameter has in the rule file."""
-    if name not in rule.params:
-        known = ", ".join(f"{key}={setting(value)}" for key, value in rule.params.items())
-        raise _bad_set(f"{rule.code} has no parameter '{name}'. It has: {known or 'none'}.")
-    kind = type(rule.params[name])
+    target, equals, text = assignment.partition("=")
+    code, dot, name = target.strip().partition(".")
+    if not (equals and dot):
+        message = f"'{sentence(assignment)}' is not CODE.param=value"
+        raise click.BadParameter(message, param_hint="--set")
     try:
-        return _BOOLEANS[text.lower()] if kind is bool else _finite(kind(text))
-    except (KeyError, ValueError):
-        raise _bad_set(f"{rule.code}.{name} takes {_KINDS[kind]}, not '{text}'.") from None
-
-
-_BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
-_KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
-
-
-def _finite(value: Value) -> Value:
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError
-    return value
-
-
-def _bad_set(message: str) -> click.BadParameter:
-    return click.BadParameter(message, param_hint="--set")
-
-
-def similar(word: str, known: Iterable[str]) -> str:
-    """Return a sentence that names what the user may have meant, and where the list is."""
-    from difflib import get_close_matches
-
-    folded = {text.lower(): text for text in known}
-    close = [folded[match] for match in get_close_matches(word.lower(), folded, cutoff=0.5)]
-    meant = f"Did you mean {' or '.join(close)}? " if close else ""
-    return f"{meant}'mavframecheck rules' lists them."
+        code, value = parameter(code, name, text.strip(), pack)
+    except SettingsError as error:
+        raise click.BadParameter(sentence(str(error)), param_hint="--set") from error
+    return code, name, value

@@ -6,13 +6,17 @@ import io
 import os
 import shutil
 import sys
-from collections.abc import Iterable, Iterator
-from typing import NoReturn
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from itertools import tee
+from pathlib import Path
+from typing import BinaryIO, NoReturn
 
 import click
 
 from mavframecheck import __version__
-from mavframecheck.report import Context, Piece
+from mavframecheck.report import FILE_WIDTH, FORMATS, Checked, Context, Piece, load
+from mavframecheck.report.escape import sentence
 
 CLOSED_PIPE = 141
 """Exit code when the reader went away: what a process killed by SIGPIPE leaves (128 + 13)."""
@@ -26,7 +30,7 @@ def page_context(*, verbose: bool = False) -> Context:
     plain = bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
     return Context(
         version=__version__,
-        width=min(shutil.get_terminal_size().columns, _WIDEST) if terminal else 80,
+        width=min(shutil.get_terminal_size().columns, _WIDEST) if terminal else FILE_WIDTH,
         terminal=terminal,
         colour=terminal and not plain,
         verbose=verbose,
@@ -51,6 +55,71 @@ def echo(pieces: Iterable[Piece]) -> None:
         except OSError as error:
             complain(f"cannot write the report: {error.strerror}")
             _leave(2)
+
+
+def parse_outputs(
+    ctx: click.Context, param: click.Parameter, values: Sequence[str]
+) -> list[tuple[str, Path]]:
+    """Return format and path of each ``FORMAT=PATH``: the callback of ``--output``."""
+    return [_output(value, ctx, param) for value in values]
+
+
+def _output(value: str, ctx: click.Context, param: click.Parameter) -> tuple[str, Path]:
+    form, _, path = value.partition("=")
+    if not (form and path):
+        message = f"'{sentence(value)}' is not FORMAT=PATH, such as json=report.json"
+    elif form not in FORMATS:
+        message = f"no format is called '{sentence(form)}'; there are {', '.join(FORMATS)}"
+    else:
+        return form, Path(path)
+    raise click.BadParameter(message, ctx, param)
+
+
+def deliver(
+    results: Iterable[Checked],
+    form: str,
+    outputs: Sequence[tuple[str, Path]],
+    context: Context,
+) -> None:
+    """Write one pass over `results` to standard output and to every file of `outputs`.
+
+    Files are opened first: a path that cannot be written is said before an hour of reading, and a
+    run that dies leaves no report of an older one. They are written even when standard output is
+    closed on the way.
+    """
+    with ExitStack() as stack:
+        files = [(each, stack.enter_context(_opened(path))) for each, path in outputs]
+        first, *copies = tee(results, len(files) + 1)
+        closed = None
+        try:
+            echo(load(form)(first, context))
+        except click.exceptions.Exit as left:
+            closed = left
+        for (each, file), copy in zip(files, copies):
+            _write(file, load(each)(copy, context.for_a_file()))
+        if closed:
+            raise closed
+
+
+def _opened(path: Path) -> BinaryIO:
+    try:
+        return path.open("wb")
+    except OSError as error:
+        reason = f"{path}: cannot write a report here: {error.strerror}"
+        raise click.UsageError(sentence(reason)) from error
+
+
+def _write(file: BinaryIO, pieces: Iterable[Piece]) -> None:
+    """Write a report as UTF-8 and close it; a full disk is no clean run."""
+    try:
+        with file:
+            file.writelines(
+                each if isinstance(each, bytes) else each.encode("utf-8", "backslashreplace")
+                for each in pieces
+            )
+    except OSError as error:
+        complain(sentence(f"{file.name}: cannot write the report: {error.strerror}"))
+        raise click.exceptions.Exit(2) from error
 
 
 def _leave(code: int) -> NoReturn:

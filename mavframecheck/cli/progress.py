@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from mavframecheck.report.escape import sentence
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
+Result = TypeVar("Result")
 PATIENCE_S = 1.0
 """Work that ends sooner shows no bar, and never pays for importing one."""
 
@@ -46,6 +47,30 @@ class Progress:
             yield advance
         finally:
             if bar is not None:
+                bar.stop()
+
+    def together(
+        self, results: Generator[tuple[str, Result]], paths: Sequence[str]
+    ) -> Generator[tuple[str, Result]]:
+        """Yield `results` of files that are judged at the same time: one bar for all of them.
+
+        It is gone while a result is out: what is written then may go to the same terminal.
+        """
+        with closing(results):
+            if not sys.stderr.isatty():
+                yield from results
+                return
+            sizes = {path: _size(path) or 0 for path in paths}
+            bar = _bar(f"0/{self._files}", sum(sizes.values()))
+            try:
+                for path, result in results:
+                    self._number += 1
+                    bar.stop()
+                    yield path, result
+                    title = f"{self._number}/{self._files}"
+                    bar.update(bar.task_ids[0], advance=sizes[path], description=title)
+                    bar.start()
+            finally:
                 bar.stop()
 
     def _title(self, path: str) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mavframecheck.cli.options import load_rules, rules_option, similar
+from mavframecheck.cli.options import complete_codes, load_rules, rules_option
 from mavframecheck.cli.output import echo, lines, page_context
 from mavframecheck.model import Rule
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("code")
+@click.argument("code", shell_complete=complete_codes)
 @rules_option
 @click.option("--format", "form", type=click.Choice(["text", "json"]), default="text")
 def rule(code: str, directories: tuple[Path, ...], form: str) -> None:
@@ -34,5 +34,7 @@ def _find(wanted: str, pack: Pack) -> Rule:
     for each in pack.rules:
         if wanted.upper() == each.code or wanted.lower() == each.name:
             return each
+    from mavframecheck.engine import similar
+
     known = [word for each in pack.rules for word in (each.code, each.name)]
     raise click.UsageError(f"no rule is called '{wanted}'. {similar(wanted, known)}")

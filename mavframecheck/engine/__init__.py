@@ -1,6 +1,7 @@
 """Rules over rows: loading, expressions, running, episodes, verdicts."""
 
 from mavframecheck.engine.check import check_file, check_recording
+from mavframecheck.engine.choices import parameter, selectors, similar
 from mavframecheck.engine.compiled import Pack
 from mavframecheck.engine.expression import RuleFileError
 from mavframecheck.engine.pack import load_pack
@@ -14,4 +15,7 @@ __all__ = [
     "check_file",
     "check_recording",
     "load_pack",
+    "parameter",
+    "selectors",
+    "similar",
 ]

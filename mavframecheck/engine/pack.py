@@ -90,8 +90,19 @@ def compile_rule(
     return CompiledRule(rule, params, source, binds, speaks_of)
 
 
+_ready: tuple[Pack, Settings, list[CompiledRule]] | None = None
+"""The rules of the last call: the files of a run share what is compiled."""
+
+
 def chosen_rules(pack: Pack, settings: Settings) -> list[CompiledRule]:
-    """Return the rules of `pack` that `settings` let run, compiled."""
+    """Return the rules of `pack` that `settings` let run; asked again for the same two, the same ones."""
+    global _ready  # noqa: PLW0603  (neither of the two can be hashed)
+    if _ready is None or _ready[0] is not pack or _ready[1] is not settings:
+        _ready = pack, settings, _chosen(pack, settings)
+    return _ready[2]
+
+
+def _chosen(pack: Pack, settings: Settings) -> list[CompiledRule]:
     return [
         compile_rule(
             rule,
@@ -106,8 +117,11 @@ def chosen_rules(pack: Pack, settings: Settings) -> list[CompiledRule]:
 
 
 def _runs(rule: Rule, settings: Settings) -> bool:
-    selected = not settings.select or rule.code.startswith(settings.select)
-    if not selected or (settings.ignore and rule.code.startswith(settings.ignore)):
+    if settings.ignore and rule.code.startswith(settings.ignore):
+        return False
+    if settings.extend_select and rule.code.startswith(settings.extend_select):
+        return True
+    if settings.select and not rule.code.startswith(settings.select):
         return False
     return rule.status == "stable" or settings.preview or rule.code in settings.select
 

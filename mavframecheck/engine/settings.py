@@ -16,6 +16,8 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True):
 
     select: tuple[str, ...] = ()
     """Prefixes of codes to run; empty: all."""
+    extend_select: tuple[str, ...] = ()
+    """Prefixes of codes to run as well, those in preview too."""
     ignore: tuple[str, ...] = ()
     preview: bool = False
     """Whether rules in preview run too (one that is selected by its full code always does)."""

@@ -11,6 +11,7 @@ from mavframecheck.model.finding import (
     RuleRun,
     Scalar,
     Subject,
+    Suppressed,
     Vehicle,
 )
 from mavframecheck.model.rule import (
@@ -25,6 +26,7 @@ from mavframecheck.model.rule import (
     SeverityWhen,
     Status,
     Step,
+    setting,
 )
 
 __all__ = [
@@ -49,5 +51,7 @@ __all__ = [
     "Status",
     "Step",
     "Subject",
+    "Suppressed",
     "Vehicle",
+    "setting",
 ]

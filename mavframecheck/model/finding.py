@@ -98,6 +98,17 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     """How to mend it."""
 
 
+class Suppressed(msgspec.Struct, frozen=True, kw_only=True):
+    """A finding that the user knows of and has set aside."""
+
+    finding: Finding
+    """What was found."""
+    by: Literal["configuration", "baseline"]
+    """What sets it aside."""
+    reason: str
+    """Why, in the words of the user; for the baseline that it is in there."""
+
+
 class RuleRun(msgspec.Struct, frozen=True, kw_only=True):
     """How a rule ended on one file: silence of a rule that could not look is not a pass."""
 
@@ -188,3 +199,5 @@ class Report(msgspec.Struct, frozen=True, kw_only=True):
     """Files read, in the order judged."""
     findings: tuple[Finding, ...]
     """What was found, file by file."""
+    suppressed: tuple[Suppressed, ...] = ()
+    """What was found and set aside by the user, file by file."""

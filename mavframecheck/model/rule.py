@@ -120,6 +120,11 @@ class Example(_Part, frozen=True):
     note: str = ""
 
 
+def setting(value: float | str | bool) -> str:
+    """Return a parameter value as it is written on the command line."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
 class Rule(_Part, frozen=True):
     """One rule file."""
 

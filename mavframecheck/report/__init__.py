@@ -8,11 +8,11 @@ that does not (text, jsonl) yields as it goes. A new format is a new file and a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import import_module
 from typing import NamedTuple, TypeAlias, cast
 
-from mavframecheck.model import FileReport, Finding, Rule
+from mavframecheck.model import FileReport, Finding, Rule, Severity, Suppressed
 
 
 class Checked(NamedTuple):
@@ -20,6 +20,20 @@ class Checked(NamedTuple):
 
     file: FileReport
     findings: tuple[Finding, ...]
+    suppressed: tuple[Suppressed, ...] = ()
+    """Findings that the user knows of and has set aside; they do not count."""
+
+
+class Remark(NamedTuple):
+    """What there is to say about a run beside its findings."""
+
+    text: str
+    path: str | None = None
+    """The file that could not be read; None when it is about a setting."""
+
+
+FILE_WIDTH = 80
+"""Columns of text in a file or a pipe."""
 
 
 class Context(NamedTuple):
@@ -29,12 +43,20 @@ class Context(NamedTuple):
     """Version of mavframecheck."""
     rules: tuple[Rule, ...] = ()
     """The rules that were at hand, for formats that describe them."""
-    width: int = 80
+    width: int = FILE_WIDTH
     """Columns to write for."""
     terminal: bool = False
     """Whether a person is watching: text for a pipe keeps its last line in one piece."""
     colour: bool = False
     verbose: bool = False
+    fail_on: Severity = Severity.WARNING
+    """How bad a finding must be to count as a failure."""
+    remarks: Sequence[Remark] = ()
+    """Grows while results are used up, and is complete after the last one."""
+
+    def for_a_file(self) -> Context:
+        """Return the context for a report that nobody watches being written."""
+        return self._replace(width=FILE_WIDTH, terminal=False, colour=False)
 
 
 Piece: TypeAlias = str | bytes
@@ -44,6 +66,12 @@ FORMATS = {
     "text": "mavframecheck.report.text",
     "json": "mavframecheck.report.json",
     "jsonl": "mavframecheck.report.jsonl",
+    "concise": "mavframecheck.report.concise",
+    "sarif": "mavframecheck.report.sarif",
+    "junit": "mavframecheck.report.junit",
+    "github": "mavframecheck.report.github",
+    "gitlab": "mavframecheck.report.gitlab",
+    "statistics": "mavframecheck.report.statistics",
 }
 """Name of each format and the module that writes it, imported when asked for."""
 

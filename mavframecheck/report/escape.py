@@ -9,6 +9,10 @@ from __future__ import annotations
 import re
 
 _SURROGATE = re.compile("[\ud800-\udfff]")
+_COMMAND = re.compile(r":(?=:)|#(?=#\w*\[)")
+"""Where a line becomes a command to the machine that runs a CI job: ``::error::``, ``##vso[``."""
+_NOT_ASCII = re.compile("[\x7f-\U0010ffff]")
+_MARKDOWN = re.compile(r"[\\`*_{}\[\]()<>#|~!&@+-]|/(?=/)")
 
 
 def terminal(text: str) -> str:
@@ -24,13 +28,42 @@ def terminal(text: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """Return `text` on one line, safe for a terminal."""
-    return terminal(" ".join(text.split()))
+    """Return `text` on one line, safe for a terminal and for the log of a CI job."""
+    line = terminal(" ".join(text.split()))
+    return _COMMAND.sub(_byte, line) if "::" in line or "##" in line else line
+
+
+def json_text(document: bytes) -> bytes:
+    r"""Return a JSON document in which what is not visible is written as ``\uXXXX``.
+
+    It says the same to every reader, and nothing to a terminal that it is shown on.
+    """
+    return document if document.isascii() and b"\x7f" not in document else _ascii(document)
+
+
+def markdown(text: str) -> str:
+    """Return `text` on one line that Markdown shows as it is: no link, no markup, no HTML."""
+    return _MARKDOWN.sub(r"\\\g<0>", sentence(text))
 
 
 def utf8(text: str) -> str:
     """Return `text` with what UTF-8 cannot hold (bytes of a non-UTF-8 file name) as escapes."""
     return _SURROGATE.sub(lambda match: _escape(match[0]), text)
+
+
+def _ascii(document: bytes) -> bytes:
+    text = document.decode()
+    return _NOT_ASCII.sub(lambda m: m[0] if m[0].isprintable() else _units(m[0]), text).encode()
+
+
+def _units(character: str) -> str:
+    """Return the UTF-16 units of a character as JSON escapes."""
+    units = character.encode("utf-16-be", "surrogatepass").hex()
+    return "".join(f"\\u{units[k : k + 4]}" for k in range(0, len(units), 4))
+
+
+def _byte(match: re.Match[str]) -> str:
+    return f"\\x{ord(match[0]):02x}"
 
 
 def _escape(character: str) -> str:

@@ -8,6 +8,7 @@ import msgspec
 
 from mavframecheck.model import Report
 from mavframecheck.report import Checked, Context
+from mavframecheck.report.escape import json_text
 from mavframecheck.report.plain import plain
 
 
@@ -18,10 +19,11 @@ def render(results: Iterable[Checked], context: Context) -> Iterator[bytes]:
         version=context.version,
         files=tuple(each.file for each in checked),
         findings=tuple(finding for each in checked for finding in each.findings),
+        suppressed=tuple(one for each in checked for one in each.suppressed),
     )
     yield document(report)
 
 
 def document(value: object) -> bytes:
     """Return `value` as an indented JSON document with a line end."""
-    return msgspec.json.format(msgspec.json.encode(plain(value)), indent=2) + b"\n"
+    return json_text(msgspec.json.format(msgspec.json.encode(plain(value)), indent=2)) + b"\n"

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 
-from mavframecheck.model import Applies, Detect, Example, Rule, Step
+from mavframecheck.model import Applies, Detect, Example, Rule, Step, setting
 from mavframecheck.report import Context
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.json import document
 from mavframecheck.report.layout import SEVERITY_COLOURS, Page
-from mavframecheck.report.words import plural, scalar, setting
+from mavframecheck.report.words import plural, scalar
 
 _LISTED = ("code", "name", "severity", "confidence", "status", "since", "summary", "params")
 _MOST_STEPS = 4

@@ -13,7 +13,15 @@ from typing import Any, get_type_hints
 
 import msgspec
 
-from mavframecheck.model import ByteLocation, FileReport, Finding, MissionLocation, Report, finding
+from mavframecheck.model import (
+    ByteLocation,
+    FileReport,
+    Finding,
+    MissionLocation,
+    Report,
+    Suppressed,
+    finding,
+)
 from mavframecheck.report.json import document
 
 PATH = Path(__file__).parents[2] / "docs" / "report.schema.json"
@@ -23,12 +31,14 @@ _REF = "#/$defs/{name}"
 
 def schema() -> dict[str, Any]:
     """Return the schema of the document that ``--format json`` writes."""
-    parts = (FileReport, _without_location(), ByteLocation, MissionLocation)
+    opened = _with(Finding, location=None)
+    parts = (FileReport, opened, _with(Suppressed, finding=opened), ByteLocation, MissionLocation)
     _, defs = msgspec.json.schema_components(parts, ref_template=_REF)
     defs["Finding"]["properties"]["location"] = {
         "anyOf": [_ref("ByteLocation"), _ref("MissionLocation"), {"type": "null"}]
     }
     defs["Finding"]["description"] = inspect.getdoc(Finding)
+    defs["Suppressed"]["description"] = inspect.getdoc(Suppressed)
     defs["Report"] = {
         "type": "object",
         "description": inspect.getdoc(Report),
@@ -36,6 +46,7 @@ def schema() -> dict[str, Any]:
             "version": {"type": "string"},
             "files": {"type": "array", "items": _ref("FileReport")},
             "findings": {"type": "array", "items": _ref("Finding")},
+            "suppressed": {"type": "array", "items": _ref("Suppressed")},
         },
     }
     _describe(defs)
@@ -47,11 +58,14 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _without_location() -> type[msgspec.Struct]:
-    """Return `Finding` with an open location: msgspec describes no union of untagged structs."""
-    types = get_type_hints(Finding) | {"location": None}
-    fields = [(name, types[name]) for name in Finding.__struct_fields__]
-    return msgspec.defstruct("Finding", fields, kw_only=True)
+def _with(struct: type[msgspec.Struct], **types: Any) -> type[msgspec.Struct]:
+    """Return a struct like `struct` but for the `types` of some fields.
+
+    The location of a finding is left open: msgspec describes no union of untagged structs.
+    """
+    known = get_type_hints(struct) | types
+    fields = [(name, known[name]) for name in struct.__struct_fields__]
+    return msgspec.defstruct(struct.__name__, fields, kw_only=True)
 
 
 def _ref(name: str) -> dict[str, Any]:

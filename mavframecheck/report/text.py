@@ -15,47 +15,48 @@ from mavframecheck.model import (
     FileReport,
     Finding,
     MissionLocation,
-    RuleRun,
-    Severity,
     Subject,
 )
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.layout import SEVERITY_COLOURS, Page
+from mavframecheck.report.verdict import Census, found, judged
 from mavframecheck.report.words import (
-    autopilot,
     component,
     elapsed,
     is_number,
     plural,
     scalar,
-    shortened,
     what_was_read,
 )
 
 _MOST_COMPONENTS = 12
 """Components listed in the head of a file: a hostile log has hundreds."""
-_MOST_AUTOPILOTS = 4
 _WIDEST_LABEL = 16
-_VERDICTS = ("ran", "insufficient-data", "not-applicable")
-"""A rule that ends differently on different streams counts as the first of these."""
 
 
 def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
-    """Yield each file as it is judged, then, when there were several, all of them in a line."""
+    """Yield each file as it is judged, then, when there were several, all of them together."""
     page = Page(context)
-    files: list[FileReport] = []
-    severities: Counter[Severity] = Counter()
-    for file, findings in results:
-        gap = [""] if files else []
-        files.append(file)
-        severities.update(finding.severity for finding in findings)
-        yield from _lines(chain(gap, _file(file, findings, page)))
-    if len(files) > 1:
-        total = f"{len(files)} files: {_found(severities)}"
-        yield from _lines(chain(("", page.bold(total)), _judged(files, page)))
-    if not files:
+    census = Census()
+    for checked in results:
+        gap = [""] if census.files else []
+        census.add(checked)
+        yield from _lines(chain(gap, _file(checked, page)))
+    if len(census.files) > 1:
+        yield from _lines(_all(census, page))
+    if not census.files:
         yield "nothing was judged\n"
+
+
+def _all(census: Census, page: Page) -> Iterator[str]:
+    """Yield which rule found something in how many files, and the verdict on all of them."""
+    from mavframecheck.report.statistics import by_rule
+
+    yield ""
+    yield from by_rule(census, page)
+    yield page.bold(census.total)
+    yield from _judged(census.files, page)
 
 
 def _lines(lines: Iterable[str]) -> Iterator[str]:
@@ -63,15 +64,17 @@ def _lines(lines: Iterable[str]) -> Iterator[str]:
     yield "".join(f"{line}\n" for line in lines)
 
 
-def _file(file: FileReport, findings: Sequence[Finding], page: Page) -> Iterator[str]:
+def _file(checked: Checked, page: Page) -> Iterator[str]:
+    file, findings = checked.file, checked.findings
     yield from _head(file, page)
     yield from _findings(file, findings, page)
     if page.context.verbose:
         yield from _damage(file, page)
         yield from _not_judged(file, page)
+        yield from _set_aside(checked, page)
     yield ""
-    found = _found(Counter(finding.severity for finding in findings))
-    yield page.bold(found) + page.dim(_hint(findings))
+    counts = Counter(finding.severity for finding in findings)
+    yield page.bold(found(counts, len(checked.suppressed))) + page.dim(_hint(findings))
     yield from _judged([file], page)
 
 
@@ -212,18 +215,6 @@ def _evidence(finding: Finding) -> list[tuple[str, str]]:
 # ---- verdict ----
 
 
-def _found(severities: Counter[Severity]) -> str:
-    """Return ``2 errors, 1 warning``, or that there is nothing."""
-    counts = [
-        f"{severities[severity]} info"
-        if severity is Severity.INFO
-        else plural(severities[severity], severity)
-        for severity in Severity
-        if severities[severity]
-    ]
-    return ", ".join(counts) or "no findings"
-
-
 def _hint(findings: Sequence[Finding]) -> str:
     """Return how to learn more of the worst finding."""
     if not findings:
@@ -232,40 +223,9 @@ def _hint(findings: Sequence[Finding]) -> str:
 
 
 def _judged(files: Sequence[FileReport], page: Page) -> Iterator[str]:
-    """Yield the last line: how much was judged, and by what idea of the vehicle."""
-    ends = Counter(_verdicts(chain.from_iterable(file.runs for file in files)).values())
-    idle = ends["not-applicable"] + ends["insufficient-data"]
-    checksums = sum(file.bad_crc for file in files)
-    parts = [
-        f"{plural(ends['ran'], 'rule')} ran",
-        f"{ends['not-applicable']} not applicable",
-        f"{ends['insufficient-data']} insufficient"
-        + (" (see --verbose)" if idle and not page.context.verbose else ""),
-        plural(sum(file.messages for file in files), "frame"),
-        *([plural(checksums, "bad checksum")] if checksums else []),
-        f"{plural(sum(file.skipped_bytes for file in files), 'byte')} skipped",
-        _vehicles(files),
-    ]
-    line = ", ".join(parts)
+    """Yield the last line, in one piece where a program may read it."""
+    line = judged(files, verbose=page.context.verbose)
     yield from page.wrap(line) if page.context.terminal else (line,)
-
-
-def _verdicts(runs: Iterable[RuleRun]) -> dict[str, str]:
-    """Return code to how the rule ended where it came furthest."""
-    best: dict[str, str] = {}
-    for run in runs:
-        best[run.code] = min(best.get(run.code, run.status), run.status, key=_VERDICTS.index)
-    return best
-
-
-def _vehicles(files: Sequence[FileReport]) -> str:
-    speakers = [vehicle for file in files for vehicle in file.vehicles]
-    known = sorted({autopilot(each) for each in speakers if each.role == "autopilot"})
-    if known:
-        return shortened(known, _MOST_AUTOPILOTS)
-    if speakers and all(each.role == "gcs" for each in speakers):
-        return "no vehicle in this log" if len(files) == 1 else "no vehicle in these logs"
-    return "unknown autopilot"
 
 
 # ---- what --verbose adds ----
@@ -295,3 +255,13 @@ def _not_judged(file: FileReport, page: Page) -> Iterator[str]:
         status = run.status.replace("-", " ")
         reason = f": {run.reason}" if run.reason else ""
         yield from page.wrap(f"{run.code} {status}{subject}{reason}", "  ", "    ")
+
+
+def _set_aside(checked: Checked, page: Page) -> Iterator[str]:
+    if not checked.suppressed:
+        return
+    yield ""
+    yield page.bold("suppressed")
+    for each in checked.suppressed:
+        what = f"{each.finding.code} {each.finding.name}, {each.finding.subject}".rstrip(", ")
+        yield from page.wrap(f"{what}: {each.reason} ({each.by})", "  ", "    ")

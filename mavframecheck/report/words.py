@@ -33,11 +33,6 @@ def scalar(value: object) -> str:
     return "unknown" if value is None else sentence(str(value))
 
 
-def setting(value: float | str | bool) -> str:
-    """Return a parameter value as it is written on the command line."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
-
-
 def is_number(text: str) -> bool:
     """Return whether `text` reads as a number, so that a unit may follow it."""
     try:

@@ -61,15 +61,15 @@ def _search(
     directory: Path, recordings: dict[Path | Stdin, None], missions: dict[Path, None]
 ) -> None:
     """Add the recordings and missions under `directory`, judged by content."""
-    for path in _files_under(directory):
-        kind = _kind_of(path)
+    for path in files_under(directory):
+        kind = kind_of(path)
         if kind is None or kind in RECORDINGS:
             recordings[path] = None
         elif kind in MISSIONS:
             missions[path] = None
 
 
-def _files_under(directory: Path) -> Iterator[Path]:
+def files_under(directory: Path) -> Iterator[Path]:
     """Walk the regular files under `directory` in a fixed order; links to directories end there."""
     for folder, subfolders, names in os.walk(directory, onerror=_refuse):
         subfolders.sort()
@@ -82,7 +82,7 @@ def _refuse(error: OSError) -> None:
     ) from error
 
 
-def _kind_of(path: Path) -> Kind | None:
+def kind_of(path: Path) -> Kind | None:
     """Sniff a file; None when it cannot be read, so that opening it can say why."""
     try:
         with path.open("rb") as file:

@@ -100,6 +100,18 @@ def test_interrupted_run_reports_what_was_done(engine: FakeEngine, logs: Path, r
     assert "interrupted" in result.stderr
 
 
+def test_ctrl_c_anywhere_is_not_taken_for_findings(
+    engine: FakeEngine, logs: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also before the first file and while a report is written."""
+
+    def interrupt(_directories: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mavframecheck.engine.load_pack", interrupt)
+    assert run("check", "a.tlog").exit_code == 130
+
+
 def test_options_become_settings(engine: FakeEngine, logs: Path, run: Run) -> None:
     """Each reaches the engine in its type."""
     run(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-HEAVY = {"rich", "jinja2", "dpkt", "pymavlink", "jsonschema"}
+HEAVY = {"rich", "jinja2", "dpkt", "pymavlink", "jsonschema", "multiprocessing", "xml"}
 ROOT = Path(__file__).parents[2]
 
 _LIST_MODULES = """
@@ -70,6 +70,19 @@ def test_closed_pipe_is_quiet(recording: Path) -> None:
         process.stdout.close()
         assert process.stderr.read() == b""
     assert process.returncode == 141
+
+
+def test_closed_pipe_leaves_the_other_reports_whole(recording: Path, tmp_path: Path) -> None:
+    """Whoever stopped reading standard output did not ask for half a file."""
+    wanted = tmp_path / "report.json"
+    command = [sys.executable, "-m", "mavframecheck", "check", str(recording)]
+    with subprocess.Popen(
+        [*command, "--output", f"json={wanted}"], stdout=subprocess.PIPE, cwd=ROOT
+    ) as process:
+        assert process.stdout
+        process.stdout.close()
+    assert process.returncode == 141
+    assert len(json.loads(wanted.read_bytes())["files"]) == 1
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full device here")

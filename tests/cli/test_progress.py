@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -56,3 +57,25 @@ def test_bar_names_the_file_and_disappears(monkeypatch: pytest.MonkeyPatch, tmp_
             advance(50)
         assert rf"{number} a[red]\x1b[2J.tlog" in watched.getvalue()
     assert "\x1b[2J" not in watched.getvalue()
+
+
+def outcomes(paths: list[str]) -> Generator[tuple[str, int]]:
+    """Yield a result for each path."""
+    yield from ((path, number) for number, path in enumerate(paths))
+
+
+def test_files_judged_at_once_share_a_bar(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It counts files and bytes; what is written between results goes where it should."""
+    paths = [str(tmp_path / name) for name in ("a.tlog", "gone.tlog")]
+    Path(paths[0]).write_bytes(bytes(100))
+    assert [*Progress(2).together(outcomes(paths), paths)] == [*outcomes(paths)]
+    assert capsys.readouterr().err == ""
+    watched = watch(monkeypatch)
+    for path, _ in Progress(2).together(outcomes(paths), paths):
+        print(f"report on {path}")  # noqa: T201
+    assert "1/2" in watched.getvalue()
+    assert "100/100 bytes" in watched.getvalue()
+    assert "report on" not in watched.getvalue()
+    assert capsys.readouterr().out.count("report on") == 2

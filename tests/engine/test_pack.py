@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from mavframecheck.engine import RuleFileError, Settings, load_pack
+from mavframecheck.engine import RuleFileError, Settings, check_file, load_pack
 from mavframecheck.engine.pack import COMPILED, chosen_rules, compiled_pack, read_rule
 from tests.engine.judged import RULE, pack_of, rule
+
+SAMPLES = Path(__file__).parents[2] / "samples"
 
 
 def test_the_compiled_pack_is_up_to_date() -> None:
@@ -128,3 +130,13 @@ class TestChoosing:
     )
     def test_by_prefix_and_status(self, settings: Settings, codes: list[str]) -> None:
         assert self.codes(settings) == codes
+
+
+def test_the_files_of_a_run_share_rules_and_nothing_else() -> None:
+    """What is compiled for one file finds the same in the next as if it were the first."""
+    pack, settings = load_pack(), Settings()
+    assert chosen_rules(pack, settings) is chosen_rules(pack, settings)
+    assert chosen_rules(pack, Settings()) is not chosen_rules(pack, settings)
+    names = ("degrees_in_scaled_field", "bad_covariance", "clean_px4", "degrees_in_scaled_field")
+    for path in [str(SAMPLES / f"{name}.tlog") for name in names]:
+        assert check_file(path, pack, settings) == check_file(path, load_pack(), Settings())

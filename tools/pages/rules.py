@@ -13,8 +13,7 @@ from pathlib import Path
 from mavframecheck.checks import load_check
 from mavframecheck.engine import Pack
 from mavframecheck.engine.pack import load_pack, source_folder
-from mavframecheck.model import Rule
-from mavframecheck.report.words import setting
+from mavframecheck.model import Rule, setting
 from tools.pages.examples import Judged, judged, shown
 from tools.pages.markdown import code, fence, page, paragraphs, table, text
 
