@@ -19,7 +19,7 @@ class Audit(Files[Checked]):
     """The files of one `check`."""
 
     def __init__(self, paths: Sequence[str], pack: engine.Pack, settings: engine.Settings) -> None:
-        super().__init__(paths, self._judge)
+        super().__init__(paths, self._judge, missions=True)
         self._pack = pack
         self._settings = settings
         self._worst = -1

@@ -65,8 +65,6 @@ class Item(NamedTuple):
     """An item as the file has it: latitude and longitude in degrees, a null as NaN."""
 
     mission_type: int
-    seq: int
-    """As it would be sent: home counts as item 0 where the autopilot wants that."""
     command: int
     frame: int
     params: tuple[float, float, float, float]
@@ -85,6 +83,8 @@ class Home(NamedTuple):
     lat: float
     lon: float
     alt_msl: float
+    at: int
+    """Where in the text it stands."""
 
 
 @dataclass(slots=True)

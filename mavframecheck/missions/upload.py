@@ -7,24 +7,40 @@ columns are 64-bit, and `Said` follows in columns of its own, which no log has.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
+from math import isnan
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.missions.planned import SAID, Item, Planned
+from mavframecheck.missions.planned import (
+    FENCE,
+    MISSION,
+    MOST_ITEMS,
+    RALLY,
+    SAID,
+    Home,
+    Item,
+    Places,
+    Planned,
+)
 from mavframecheck.model import MissionLocation
 from mavframecheck.semantics.constants import constant, entry_name
 from mavframecheck.semantics.mavframe import GLOBAL_FRAMES, METRIC_FRAMES
 from mavframecheck.semantics.names import family as family_of
 from mavframecheck.wire import Batch, Dialect, Field, Frames, Layout, Table
 
+ITEM = "MISSION_ITEM_INT"
+"""The message that carries the items."""
 VEHICLE, GROUND_STATION = (1, 1), (255, 190)
 """System and component of who would speak."""
 UNSET = 2**31 - 1
 """x and y of an item whose latitude or longitude is NaN: INT32_MAX is the standard's "not set"."""
+_ARDUPILOT = constant("MAV_AUTOPILOT.ARDUPILOTMEGA")
+_WAYPOINT = constant("MAV_CMD.NAV_WAYPOINT")
+_GLOBAL = constant("MAV_FRAME.GLOBAL")
 _LIMIT = 2.0**62
 """Beyond this a number that is no place anyway is cut, so that it fits 64 bits."""
 _FROM_FAMILY = {
@@ -49,15 +65,18 @@ class Upload:
 
     def __init__(self, planned: Planned, dialect: Dialect, family: str | None = None) -> None:
         """Send `planned` to the autopilot that it names, or to one of `family` whatever it names."""
+        autopilot, vehicle_type = _told(planned, family)
+        self.told = None if autopilot is None else (autopilot, vehicle_type)
+        """MAV_AUTOPILOT and, where that is known, MAV_TYPE of the vehicle that it is for."""
         self._text = planned.text
-        self._items = sorted(planned.items, key=lambda item: item.mission_type)
+        self._sent = list(_numbered(planned, autopilot))
         rows = {
-            "HEARTBEAT": _heartbeat(planned, family),
-            "HOME_POSITION": _home(planned),
-            "MISSION_COUNT": _counts(self._items),
-            "MISSION_ITEM_INT": _columns(self._items),
+            "HEARTBEAT": _heartbeat(autopilot, vehicle_type),
+            "HOME_POSITION": _home(planned.home),
+            "MISSION_COUNT": _counts(self._sent),
+            ITEM: _columns(self._sent),
         }
-        order = _order(rows, self._items)
+        order = _order(rows, self._sent)
         frames = _frames(order, dialect)
         tables = {
             name: Table(
@@ -69,44 +88,70 @@ class Upload:
             for name, columns in rows.items()
             if (order == name).any()
         }
-        self._item_of = dict(
-            zip(np.flatnonzero(order == "MISSION_ITEM_INT").tolist(), self._items, strict=True)
-        )
+        self._rows = np.cumsum(order == ITEM) - 1
+        self._is_item = order == ITEM
         self.batch = Batch(frames, dialect, tables=tables)
+
+    def __len__(self) -> int:
+        """Return the number of items."""
+        return len(self._sent)
 
     def locate(self, number: int, field: str | None = None) -> MissionLocation:
         """Return where frame `number` stands in the file: its `field`, if that is written, else the item."""
-        item = self._item_of.get(number)
-        if item is None:
+        if not self._is_item[number]:
             return MissionLocation(None, None, None, None)
+        seq, item = self._sent[self._rows[number]]
         at = getattr(item.places, field or "", -1)
         line, column = self._text.place(at if at >= 0 else item.places.item)
-        return MissionLocation(line, column, item.seq, entry_name("MAV_CMD", item.command))
+        return MissionLocation(line, column, seq, entry_name("MAV_CMD", item.command))
 
 
-def _order(rows: Mapping[str, Columns], items: Sequence[Item]) -> npt.NDArray[np.str_]:
+Sent: TypeAlias = tuple[int, Item]
+"""An item with the number that it would be sent as."""
+
+
+def _numbered(planned: Planned, autopilot: int | None) -> Iterator[Sent]:
+    """Yield all items in the order in which they would be sent; ArduPilot gets home as item 0 of a plan."""
+    home = planned.home
+    first = int(planned.kind == "plan" and autopilot == _ARDUPILOT)
+    if first and home is not None:
+        at, alt = home.at, 0.0 if isnan(home.alt_msl) else home.alt_msl
+        params, places = (0.0, 0.0, 0.0, 0.0), Places(at, at, at)
+        yield 0, Item(MISSION, _WAYPOINT, _GLOBAL, params, home.lat, home.lon, alt, places)
+    for kind in (MISSION, FENCE, RALLY):
+        items = [item for item in planned.items if item.mission_type == kind]
+        if len(items) > MOST_ITEMS:
+            problem = f"more than {MOST_ITEMS} items cannot be sent to a vehicle"
+            planned.text.fail(items[MOST_ITEMS].places.item, problem)
+        yield from enumerate(items, first if kind == MISSION else 0)
+
+
+def _told(planned: Planned, family: str | None) -> tuple[int | None, int | None]:
+    """Return MAV_AUTOPILOT and MAV_TYPE: what `family` says, else the file."""
+    if family is None:
+        return planned.autopilot, planned.vehicle_type
+    name, default = _FROM_FAMILY[family]
+    autopilot, vehicle_type = constant(f"MAV_AUTOPILOT.{name}"), planned.vehicle_type
+    if default and family_of(autopilot, vehicle_type or 0) != family:
+        vehicle_type = constant(f"MAV_TYPE.{default}")
+    return autopilot, vehicle_type
+
+
+def _order(rows: Mapping[str, Columns], sent: Sequence[Sent]) -> npt.NDArray[np.str_]:
     """Return (n,) the message of each frame: who and where, then every count with its items behind it."""
     order = [name for name in ("HEARTBEAT", "HOME_POSITION") if rows[name]]
-    for _, group in groupby(items, key=lambda item: item.mission_type):
-        order += ["MISSION_COUNT", *("MISSION_ITEM_INT" for _ in group)]
+    for _, group in groupby(sent, key=lambda each: each[1].mission_type):
+        order += ["MISSION_COUNT", *(ITEM for _ in group)]
     return np.array(order, np.str_)
 
 
-def _heartbeat(planned: Planned, family: str | None) -> Columns:
-    """Return the HEARTBEAT of the autopilot that `family`, else the file, names; nothing if none does."""
-    autopilot, vehicle_type = planned.autopilot, planned.vehicle_type
-    if family is not None:
-        name, default = _FROM_FAMILY[family]
-        autopilot = constant(f"MAV_AUTOPILOT.{name}")
-        if default and family_of(autopilot, vehicle_type or 0) != family:
-            vehicle_type = constant(f"MAV_TYPE.{default}")
+def _heartbeat(autopilot: int | None, vehicle_type: int | None) -> Columns:
     if autopilot is None:
         return {}
     return {"autopilot": np.array([autopilot]), "type": np.array([vehicle_type or 0])}
 
 
-def _home(planned: Planned) -> Columns:
-    home = planned.home
+def _home(home: Home | None) -> Columns:
     if home is None:
         return {}
     scaled = {
@@ -117,21 +162,23 @@ def _home(planned: Planned) -> Columns:
     return {name: np.array([value]) for name, value in scaled.items()}
 
 
-def _counts(items: Sequence[Item]) -> Columns:
-    kinds, counts = np.unique([item.mission_type for item in items], return_counts=True)
+def _counts(sent: Sequence[Sent]) -> Columns:
+    kinds, counts = np.unique([item.mission_type for _, item in sent], return_counts=True)
     target = np.full(len(kinds), VEHICLE[0])
     return {"mission_type": kinds, "count": counts, "target_system": target}
 
 
-def _columns(items: Sequence[Item]) -> Columns:
+def _columns(sent: Sequence[Sent]) -> Columns:
     """Return the columns of MISSION_ITEM_INT, and those of `Said`."""
+    items = [item for _, item in sent]
     frame = np.array([item.frame for item in items], np.int64)
     scale = np.where(np.isin(frame, GLOBAL_FRAMES), 1e7, 1.0)
     scale = np.where(np.isin(frame, METRIC_FRAMES), 1e4, scale)
     columns: Columns = {
         name: np.array([getattr(item, name) for item in items])
-        for name in ("seq", "command", "frame", "current", "autocontinue", "mission_type", "z")
+        for name in ("command", "frame", "current", "autocontinue", "mission_type", "z")
     }
+    columns["seq"] = np.array([seq for seq, _ in sent])
     columns["x"] = _scaled(np.array([item.x for item in items]), scale)
     columns["y"] = _scaled(np.array([item.y for item in items]), scale)
     for k in range(4):
@@ -150,7 +197,7 @@ def _scaled(values: Floats, scale: Floats) -> Ints:
 def _wide(layout: Layout) -> Layout:
     """Return a layout whose numbers have 64 bits, with columns for `Said` where it holds an item."""
     names = [f.name for f in layout.fields if not f.length]
-    extra = SAID if layout.name == "MISSION_ITEM_INT" else ()
+    extra = SAID if layout.name == ITEM else ()
     integers = {f.name for f in layout.fields if f.type.startswith(("int", "uint"))}
     integers -= _FLOATS.get(layout.name, frozenset())
     fields = tuple(

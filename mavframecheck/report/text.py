@@ -32,6 +32,7 @@ from mavframecheck.report.words import (
     shortened,
     what_was_read,
 )
+from mavframecheck.sources import MISSIONS
 
 _MOST_COMPONENTS = 12
 """Components listed in the head of a file: a hostile log has hundreds."""
@@ -81,6 +82,10 @@ def _file(file: FileReport, findings: Sequence[Finding], page: Page) -> Iterator
 def _head(file: FileReport, page: Page) -> Iterator[str]:
     yield page.bold(sentence(file.path))
     yield from page.wrap(what_was_read(file), "  ", "    ")
+    if file.kind in MISSIONS:
+        yield from (f"  for {component(vehicle)}" for vehicle in file.vehicles)
+        yield from _notes(file, page)
+        return
     speakers = file.vehicles if page.context.verbose else file.vehicles[:_MOST_COMPONENTS]
     ids = [f"{vehicle.sysid}/{vehicle.compid}" for vehicle in speakers]
     column = max((len(text) for text in ids), default=0) + 2
@@ -88,6 +93,10 @@ def _head(file: FileReport, page: Page) -> Iterator[str]:
         yield from page.wrap(component(vehicle), f"  {text:{column}}", " " * (column + 2))
     if len(file.vehicles) > len(speakers):
         yield f"  and {plural(len(file.vehicles) - len(speakers), 'more sender')} (--verbose)"
+    yield from _notes(file, page)
+
+
+def _notes(file: FileReport, page: Page) -> Iterator[str]:
     for note in file.notes:
         yield from page.wrap(f"note: {note}", "  ", "    ")
 
@@ -108,13 +117,19 @@ def _findings(file: FileReport, findings: Sequence[Finding], page: Page) -> Iter
 
 
 def _sorted(findings: Sequence[Finding]) -> list[Finding]:
-    """Return the findings by stream, within it the worst first, then in order of time."""
+    """Return the findings by stream, within it the worst first, then in order of time or line."""
 
-    def key(finding: Finding) -> tuple[int, int, str, int, bool, float]:
+    def key(finding: Finding) -> tuple[int, int, str, int, bool, float, int]:
         stream = _number(finding.sysid), _number(finding.compid), finding.message_name or ""
-        return *stream, _rank(finding), finding.time_first is None, finding.time_first or 0.0
+        time = finding.time_first is None, finding.time_first or 0.0
+        return *stream, _rank(finding), *time, _line(finding)
 
     return sorted(findings, key=key)
+
+
+def _line(finding: Finding) -> int:
+    location = finding.location
+    return (location.line or 0) if isinstance(location, MissionLocation) else 0
 
 
 def _number(component: int | None) -> int:
@@ -182,13 +197,14 @@ def _where(finding: Finding) -> str:
     match finding.location:
         case ByteLocation(offset=offset):
             return f"first at byte {offset}" if finding.count > 1 else f"byte {offset}"
-        case MissionLocation(line=line, item=item, command=command):
+        case MissionLocation(line=line, column=column, item=item, command=command):
             parts = (
                 f"line {line}" if line is not None else "",
+                f"column {column}" if column is not None else "",
                 f"item {item}" if item is not None else "",
                 command or "",
             )
-            return ", ".join(filter(None, parts))
+            return ("first in " if finding.count > 1 else "") + ", ".join(filter(None, parts))
     return ""
 
 
@@ -235,19 +251,29 @@ def _judged(files: Sequence[FileReport], page: Page) -> Iterator[str]:
     """Yield the last line: how much was judged, and by what idea of the vehicle."""
     ends = Counter(_verdicts(chain.from_iterable(file.runs for file in files)).values())
     idle = ends["not-applicable"] + ends["insufficient-data"]
-    checksums = sum(file.bad_crc for file in files)
     parts = [
         f"{plural(ends['ran'], 'rule')} ran",
         f"{ends['not-applicable']} not applicable",
         f"{ends['insufficient-data']} insufficient"
         + (" (see --verbose)" if idle and not page.context.verbose else ""),
-        plural(sum(file.messages for file in files), "frame"),
-        *([plural(checksums, "bad checksum")] if checksums else []),
-        f"{plural(sum(file.skipped_bytes for file in files), 'byte')} skipped",
+        *_read(files),
         _vehicles(files),
     ]
     line = ", ".join(parts)
     yield from page.wrap(line) if page.context.terminal else (line,)
+
+
+def _read(files: Sequence[FileReport]) -> Iterator[str]:
+    """Yield how much was read of recordings, and of missions."""
+    missions = [file for file in files if file.kind in MISSIONS]
+    recordings = [file for file in files if file.kind not in MISSIONS]
+    if missions:
+        yield plural(sum(file.messages for file in missions), "mission item")
+    if recordings:
+        checksums = sum(file.bad_crc for file in recordings)
+        yield plural(sum(file.messages for file in recordings), "frame")
+        yield from [plural(checksums, "bad checksum")] if checksums else []
+        yield f"{plural(sum(file.skipped_bytes for file in recordings), 'byte')} skipped"
 
 
 def _verdicts(runs: Iterable[RuleRun]) -> dict[str, str]:
