@@ -18,8 +18,16 @@ FINDINGS = 1
 class Audit(Files[Checked]):
     """The files of one `check`."""
 
-    def __init__(self, paths: Sequence[str], pack: engine.Pack, settings: engine.Settings) -> None:
+    def __init__(
+        self,
+        paths: Sequence[str],
+        pack: engine.Pack,
+        settings: engine.Settings,
+        *,
+        fix: bool = False,
+    ) -> None:
         super().__init__(paths, self._judge, missions=True)
+        self._fix = fix
         self._pack = pack
         self._settings = settings
         self._worst = -1
@@ -30,6 +38,10 @@ class Audit(Files[Checked]):
         return FINDINGS if code == DONE and self._worst >= fail_on.rank else code
 
     def _judge(self, path: str, advance: Advance | None) -> tuple[Checked, int]:
+        if self._fix:
+            from mavframecheck.cli.mend import mend_in_place
+
+            mend_in_place(path, self._pack, self._settings)
         try:
             checked = Checked(*engine.check_file(path, self._pack, self._settings, advance))
         except (engine.SettingsError, engine.RuleFileError) as error:

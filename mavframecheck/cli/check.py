@@ -62,8 +62,14 @@ _FAMILIES = ("px4", "arducopter", "arduplane", "ardurover", "ardusub")
 @click.option(
     "--autopilot",
     type=click.Choice(_FAMILIES),
-    help="What the vehicle is, where the recording does not say.",
+    help="What the vehicle is, where a recording does not say; in mission files whatever they say.",
 )
+@click.option(
+    "--fix",
+    is_flag=True,
+    help="Mend in mission files what is certain, and judge what is left.",
+)
+@click.option("--diff", is_flag=True, help="Only show what --fix would change.")
 @dialect_option
 @input_kind_option
 @click.option(
@@ -89,6 +95,8 @@ def check(
     fail_on: str,
     directories: tuple[Path, ...],
     verbose: bool,
+    fix: bool,
+    diff: bool,
     **chosen: Any,
 ) -> None:
     """Judge recordings and missions: files, directories, or - for standard input.
@@ -102,7 +110,14 @@ def check(
     from mavframecheck.cli.audit import Audit
 
     pack = load_rules(directories)
-    audit = Audit(paths, pack, _settings(pack, **chosen))
+    settings = _settings(pack, **chosen)
+    if diff:
+        from mavframecheck.cli.mend import Diffs
+
+        diffs = Diffs(paths, pack, settings)
+        echo(diffs.results())
+        ctx.exit(diffs.verdict())
+    audit = Audit(paths, pack, settings, fix=fix)
     context = page_context(verbose=verbose)._replace(rules=tuple(pack.rules))
     echo(load(form)(audit.results(), context))
     ctx.exit(audit.verdict(Severity(fail_on)))

@@ -8,10 +8,10 @@ token by token.
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Iterator
-from json.decoder import JSONDecodeError, scanstring
 from typing import NoReturn, TypeAlias
 
 from mavframecheck.missions.text import Text
@@ -99,7 +99,7 @@ def _value(text: Text, match: re.Match[str]) -> tuple[Value, int]:
     if match[4] is not None:
         return _CONSTANTS[match[4]], match.start(4)
     if match[3] is not None:
-        return _string(text, match.start(3)), match.start(3)
+        return _string(text, match[3], match.start(3)), match.start(3)
     at = match.start(5)
     return (Object(at) if match[5] == "{" else Array(at)), at
 
@@ -111,7 +111,7 @@ def _put(text: Text, box: Object | Array, match: re.Match[str], value: Value, at
         text.fail(match.start(1), "a key in an array: only objects, in braces, have keys")
     if written is None:
         text.fail(at, 'here belongs a key in double quotes, such as "items"')
-    key = written[1:-1] if "\\" not in written else _string(text, match.start(1))
+    key = _string(text, written, match.start(1))
     if key in box:
         line = text.place(box.at[key])[0]
         problem = f'"{key[:40]}" stands twice in one object (first in line {line}): remove one'
@@ -157,11 +157,14 @@ def _number(text: Text, word: str, at: int) -> int | float:
     return number
 
 
-def _string(text: Text, at: int) -> str:
+def _string(text: Text, written: str, at: int) -> str:
+    """Return what a string in its quotes says."""
+    if "\\" not in written:
+        return written[1:-1]
     try:
-        return scanstring(text.content, at + 1, True)[0]
-    except JSONDecodeError as error:
-        text.fail(error.pos, f"no string of JSON: {error.msg}")
+        return str(json.loads(written))
+    except json.JSONDecodeError as error:
+        text.fail(at + error.pos, f"no string of JSON: {error.msg}")
 
 
 def _refuse(text: Text, here: int, values: int) -> NoReturn:

@@ -45,6 +45,11 @@ class Text:
             return math.nan
         return float(max(len(match[1] or "") - int(match[2] or 0), 0))
 
+    def number(self, offset: int) -> str:
+        """Return the number that is written at `offset`."""
+        match = _WRITTEN.match(self.content, offset)
+        return match[0] if match else ""
+
     def fail(self, offset: int, problem: str) -> NoReturn:
         """Raise MissionError for the character at `offset`."""
         line, column = self.place(offset)

@@ -79,11 +79,11 @@ class Recording:
 
 
 def open_recording(
-    path: str | Path, input_kind: str | None = None, kinds: frozenset[Kind] = RECORDINGS
+    path: str | Path, input_kind: str | None = None, kinds: frozenset[Kind] | None = RECORDINGS
 ) -> Recording:
     """Open a file, or standard input for `-`; `input_kind` overrules what the content looks like.
 
-    Raises SourceError when it cannot be read or is none of `kinds`.
+    Raises SourceError when it cannot be read or is none of `kinds` (None: whatever it is).
     """
     kind = _chosen(input_kind)
     name, file = _open(path)
@@ -91,7 +91,7 @@ def open_recording(
         if path != STDIN:
             opened.callback(file.close)
         recording = Recording(name, file, kind)
-        if recording.kind not in kinds:
+        if kinds is not None and recording.kind not in kinds:
             raise NoRecordingError(f"{name}: this {REFUSALS[recording.kind]}")
         opened.pop_all()  # from here on the recording closes it
     return recording
