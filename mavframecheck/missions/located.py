@@ -25,10 +25,10 @@ LONGEST_NUMBER = 400
 
 _SPACE = r"[ \t\n\r]*+"
 _NUMBER = r"-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?(?:[eE][+-]?[0-9]++)?"
-_STRING = r'"(?:[^"\\\x00-\x1f]++|\\.)*+"'
+_STRING = r'"((?:[^"\\\x00-\x1f]++|\\.)*+)"'
 _MEMBER = re.compile(
-    rf"{_SPACE}(?:({_STRING}){_SPACE}:{_SPACE})?"
-    rf"(?:({_NUMBER})|({_STRING})|(true|false|null)|([\[{{]))"
+    rf"{_SPACE}(?:{_STRING}{_SPACE}:{_SPACE})?"
+    rf"(?:({_NUMBER})|{_STRING}|(true|false|null)|([\[{{]))"
     rf"((?:{_SPACE}[\]}}])*+){_SPACE}(,?)"
 )
 _BLANK = re.compile(_SPACE)
@@ -61,61 +61,69 @@ Value: TypeAlias = Object | Array | str | int | float | bool | None
 
 def parse(text: Text) -> Value:
     """Return the value that `text` is; MissionError where it is no JSON, ambiguous or too large."""
+    content, take = text.content, _MEMBER.match
+    _bound(text)
     root = Array(0)
     opened: list[Object | Array] = [root]
-    here = values = 0
-    while len(opened) > 1 or not root:
-        match = _MEMBER.match(text.content, here)
-        values += 1
-        if match is None or values > MOST_VALUES:
-            _refuse(text, here, values)
-        key, number, _, _, opening, closing, comma = match.groups()
-        box, here = opened[-1], match.end()
+    box: Object | Array = root
+    here = 0
+    while box is not root or not root:
+        match = take(content, here)
+        if match is None:
+            _refuse(text, here)
+        _, number, string, word, opening, closing, comma = match.groups()
+        here = match.end()
+        value: Value
         if number is not None:
             at = match.start(2)
-            value: Value = int(number) if number.isdigit() else _number(text, number, at)
+            value = int(number) if number.isdigit() else _number(text, number, at)
+        elif string is not None:
+            at = match.start(3) - 1
+            value = string if "\\" not in string else _unescaped(text, string, at)
+        elif word is not None:
+            at, value = match.start(4), _CONSTANTS[word]
         else:
-            value, at = _value(text, match)
-        if type(box) is Array and key is None:
-            box.append(value)
-            box.at.append(at)
-        else:
-            _put(text, box, match, value, at)
-        if opening and isinstance(value, Object | Array):
+            at = match.start(5)
+            value = Object(at) if opening == "{" else Array(at)
+        _put(text, box, match, value, at)
+        if isinstance(value, Object | Array):
             opened.append(value)
+            if len(opened) > DEEPEST:
+                text.fail(at, f"more than {DEEPEST} levels of nesting: this is no mission")
         if closing:
             _close(text, opened, match)
-        if (comma == "") != (len(opened) == 1 or (opening is not None and not closing)):
+        box = opened[-1]
+        if (comma == "") != (box is root or (opening is not None and not closing)):
             _wrong_comma(text, opened, match)
-        if len(opened) > DEEPEST:
-            text.fail(at, f"more than {DEEPEST} levels of nesting: this is no mission")
-    if here < len(text.content):
+    if here < len(content):
         text.fail(here, "the JSON has ended before this: remove what follows")
     return root[0]
 
 
-def _value(text: Text, match: re.Match[str]) -> tuple[Value, int]:
-    """Return the value of a member, an empty one where it opens, and where it begins."""
-    if match[4] is not None:
-        return _CONSTANTS[match[4]], match.start(4)
-    if match[3] is not None:
-        return _string(text, match[3], match.start(3)), match.start(3)
-    at = match.start(5)
-    return (Object(at) if match[5] == "{" else Array(at)), at
+def _bound(text: Text) -> None:
+    """Fail before a text that could hold too many values is read: each but the first needs one of these."""
+    most = sum(map(text.content.count, ",[{"))
+    if most > MOST_VALUES:
+        text.fail(0, f"more than {MOST_VALUES} values: this is no mission")
 
 
 def _put(text: Text, box: Object | Array, match: re.Match[str], value: Value, at: int) -> None:
-    """Add a member to the object that is open."""
-    written = match[1]
+    """Add a member to the object or array that is open."""
+    key = match[1]
     if isinstance(box, Array):
-        text.fail(match.start(1), "a key in an array: only objects, in braces, have keys")
-    if written is None:
+        if key is not None:
+            text.fail(match.start(1), "a key in an array: only objects, in braces, have keys")
+        box.append(value)
+        box.at.append(at)
+        return
+    if key is None:
         text.fail(at, 'here belongs a key in double quotes, such as "items"')
-    key = _string(text, written, match.start(1))
+    if "\\" in key:
+        key = _unescaped(text, key, match.start(1) - 1)
     if key in box:
         line = text.place(box.at[key])[0]
         problem = f'"{key[:40]}" stands twice in one object (first in line {line}): remove one'
-        text.fail(match.start(1), problem)
+        text.fail(match.start(1) - 1, problem)
     box[key] = value
     box.at[key] = at
 
@@ -157,26 +165,26 @@ def _number(text: Text, word: str, at: int) -> int | float:
     return number
 
 
-def _string(text: Text, written: str, at: int) -> str:
-    """Return what a string in its quotes says."""
-    if "\\" not in written:
-        return written[1:-1]
+def _unescaped(text: Text, written: str, at: int) -> str:
+    """Return what a string with escapes says."""
     try:
-        return str(json.loads(written))
+        return str(json.loads(f'"{written}"'))
     except json.JSONDecodeError as error:
         text.fail(at + error.pos, f"no string of JSON: {error.msg}")
 
 
-def _refuse(text: Text, here: int, values: int) -> NoReturn:
+def _refuse(text: Text, here: int) -> NoReturn:
     """Say what is wrong where a member belongs."""
-    if values > MOST_VALUES:
-        text.fail(here, f"more than {MOST_VALUES} values: this is no mission")
     blank = _BLANK.match(text.content, here)
     at = blank.end() if blank else here
     if at >= len(text.content):
         text.fail(at, "the file ends in the middle: it was cut off")
     word = _WORD.match(text.content, at)
     written = (word[0] if word else "") or text.content[at]
+    if written in "]}":
+        text.fail(at, f"a value belongs between the comma or colon before this and the {written}")
+    if written == '"':
+        text.fail(at, "a string that does not end on its line, or holds a control character")
     if written.strip("-+").lower() in ("nan", "inf", "infinity"):
         text.fail(at, f"{written} is no JSON: write null for a number that is not set")
     text.fail(at, f"{written[:40]!r} is no JSON")
