@@ -26,6 +26,7 @@ from mavframecheck.report.words import (
     autopilot,
     component,
     elapsed,
+    intended,
     is_number,
     plural,
     scalar,
@@ -83,7 +84,7 @@ def _head(file: FileReport, page: Page) -> Iterator[str]:
     yield page.bold(sentence(file.path))
     yield from page.wrap(what_was_read(file), "  ", "    ")
     if file.kind in MISSIONS:
-        yield from (f"  for {component(vehicle)}" for vehicle in file.vehicles)
+        yield from (f"  for {intended(vehicle)}" for vehicle in file.vehicles)
         yield from _notes(file, page)
         return
     speakers = file.vehicles if page.context.verbose else file.vehicles[:_MOST_COMPONENTS]

@@ -97,6 +97,11 @@ def component(vehicle: Vehicle) -> str:
     return f"{role}, {kind}" if kind else role
 
 
+def intended(vehicle: Vehicle) -> str:
+    """Return what a mission is for: no file says which version."""
+    return component(vehicle).replace(" of unknown version", "")
+
+
 def extent(file: FileSummary) -> str:
     """Return what the file is, how long, how much: ``tlog, 42 s from 2026-01-01 00:00:00 UTC, 210 frames``."""
     noun = "item" if file.kind in MISSIONS else "frame"
