@@ -31,6 +31,7 @@ _MEMBER = re.compile(
     rf"(?:({_NUMBER})|{_STRING}|(true|false|null)|([\[{{]))"
     rf"((?:{_SPACE}[\]}}])*+){_SPACE}(,?)"
 )
+_KEY = re.compile(rf"{_SPACE}{_STRING}{_SPACE}:")
 _BLANK = re.compile(_SPACE)
 _WORD = re.compile(r"[-+\w.]*")
 _CONSTANTS = {"true": True, "false": False, "null": None}
@@ -76,7 +77,8 @@ def parse(text: Text) -> Value:
         value: Value
         if number is not None:
             at = match.start(2)
-            value = int(number) if number.isdigit() else _number(text, number, at)
+            short = len(number) < 18 and number.isdigit()
+            value = int(number) if short else _number(text, number, at)
         elif string is not None:
             at = match.start(3) - 1
             value = string if "\\" not in string else _unescaped(text, string, at)
@@ -117,6 +119,8 @@ def _put(text: Text, box: Object | Array, match: re.Match[str], value: Value, at
         box.at.append(at)
         return
     if key is None:
+        if _KEY.match(text.content, match.start()):
+            _refuse(text, match.start())
         text.fail(at, 'here belongs a key in double quotes, such as "items"')
     if "\\" in key:
         key = _unescaped(text, key, match.start(1) - 1)
@@ -157,7 +161,7 @@ def _wrong_comma(text: Text, opened: list[Object | Array], match: re.Match[str])
 def _number(text: Text, word: str, at: int) -> int | float:
     if len(word) > LONGEST_NUMBER:
         text.fail(at, f"a number of {len(word)} characters: this is no mission")
-    if word.isdigit():
+    if word.removeprefix("-").isdigit() and math.isfinite(float(word)):
         return int(word)
     number = float(word)
     if not math.isfinite(number):
@@ -175,7 +179,8 @@ def _unescaped(text: Text, written: str, at: int) -> str:
 
 def _refuse(text: Text, here: int) -> NoReturn:
     """Say what is wrong where a member belongs."""
-    blank = _BLANK.match(text.content, here)
+    key = _KEY.match(text.content, here)
+    blank = _BLANK.match(text.content, key.end() if key else here)
     at = blank.end() if blank else here
     if at >= len(text.content):
         text.fail(at, "the file ends in the middle: it was cut off")

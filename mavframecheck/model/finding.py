@@ -13,6 +13,10 @@ Evidence: TypeAlias = dict[str, Scalar]
 """`expected`, `observed`, `unit`, `frame` and what else the rule found worth saying."""
 
 
+MISSION_KINDS = frozenset({"plan", "wpl", "points", "rally"})
+"""`FileSummary.kind` of mission files; every other kind is a recording."""
+
+
 class ByteLocation(msgspec.Struct, frozen=True):
     """A place in a recording."""
 

@@ -19,6 +19,7 @@ from mavframecheck.model import (
     Severity,
     Subject,
 )
+from mavframecheck.model.finding import MISSION_KINDS
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.layout import SEVERITY_COLOURS, Page
@@ -33,7 +34,6 @@ from mavframecheck.report.words import (
     shortened,
     what_was_read,
 )
-from mavframecheck.sources import MISSIONS
 
 _MOST_COMPONENTS = 12
 """Components listed in the head of a file: a hostile log has hundreds."""
@@ -83,7 +83,7 @@ def _file(file: FileReport, findings: Sequence[Finding], page: Page) -> Iterator
 def _head(file: FileReport, page: Page) -> Iterator[str]:
     yield page.bold(sentence(file.path))
     yield from page.wrap(what_was_read(file), "  ", "    ")
-    if file.kind in MISSIONS:
+    if file.kind in MISSION_KINDS:
         yield from (f"  for {intended(vehicle)}" for vehicle in file.vehicles)
         yield from _notes(file, page)
         return
@@ -266,8 +266,8 @@ def _judged(files: Sequence[FileReport], page: Page) -> Iterator[str]:
 
 def _read(files: Sequence[FileReport]) -> Iterator[str]:
     """Yield how much was read of recordings, and of missions."""
-    missions = [file for file in files if file.kind in MISSIONS]
-    recordings = [file for file in files if file.kind not in MISSIONS]
+    missions = [file for file in files if file.kind in MISSION_KINDS]
+    recordings = [file for file in files if file.kind not in MISSION_KINDS]
     if missions:
         yield plural(sum(file.messages for file in missions), "mission item")
     if recordings:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from datetime import UTC, datetime
 
 from mavframecheck.model import Vehicle
-from mavframecheck.model.finding import FileSummary
+from mavframecheck.model.finding import MISSION_KINDS, FileSummary
 from mavframecheck.report.escape import sentence
 from mavframecheck.semantics.names import FAMILY_NAMES
-from mavframecheck.sources import MISSIONS
 
 _YEAR_10000 = 253_402_300_800
 _ROLES = {"gcs": "ground station", "adsb": "ADS-B receiver", "unknown": "unknown component"}
@@ -104,7 +103,7 @@ def intended(vehicle: Vehicle) -> str:
 
 def extent(file: FileSummary) -> str:
     """Return what the file is, how long, how much: ``tlog, 42 s from 2026-01-01 00:00:00 UTC, 210 frames``."""
-    noun = "item" if file.kind in MISSIONS else "frame"
+    noun = "item" if file.kind in MISSION_KINDS else "frame"
     frames = plural(file.messages, noun) if file.messages else "nothing could be decoded"
     start = f" from {utc(file.time_start)}" if file.time_start is not None else ""
     length = [duration(file.duration_s) + start] if file.duration_s is not None else []

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.model.finding import MISSION_KINDS
 from mavframecheck.sources.stream import ByteStream
 
 SNIFF_BYTES = 256 * 1024
@@ -50,7 +51,7 @@ class Kind(StrEnum):
 
 
 RECORDINGS = frozenset({Kind.TLOG, Kind.RAW, Kind.PCAP, Kind.PCAPNG})
-MISSIONS = frozenset({Kind.PLAN, Kind.WPL, Kind.POINTS, Kind.RALLY})
+MISSIONS = frozenset(Kind(kind) for kind in MISSION_KINDS)
 
 _NO_RECORDING = "no recording: 'mavframecheck check' judges it"
 _RECORD_A_TLOG = "record a tlog with a ground station or MAVProxy"
