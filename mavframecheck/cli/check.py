@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from mavframecheck.engine import Pack, Settings
 
 _EXAMPLE = """\
-Give a recording, a directory of them, or - for standard input. For example:
+Give a recording or mission, a directory of them, or - for standard input. For example:
 
   mavframecheck check flight.tlog
+  mavframecheck check mission.plan
   mavframecheck check logs/ --fail-on error
   mavframecheck check flight.tlog --select MFC1,MFC302 --format json
 

@@ -16,8 +16,8 @@ from typing import NoReturn, TypeAlias
 
 from mavframecheck.missions.text import Text
 
-MOST_VALUES = 3_000_000
-"""Values of one file: more would take a gigabyte."""
+MOST_VALUES = 1_500_000
+"""Values of one file; 65 535 items with all that QGroundControl writes of them have fewer."""
 DEEPEST = 60
 """Objects and arrays inside each other; a plan has six."""
 LONGEST_NUMBER = 400
@@ -40,6 +40,8 @@ _CONSTANTS = {"true": True, "false": False, "null": None}
 class Object(dict[str, "Value"]):
     """A JSON object: `at` holds the offset of each value, `begin` and `end` are its own."""
 
+    __slots__ = ("at", "begin", "end")
+
     def __init__(self, begin: int) -> None:
         """Start empty at offset `begin`."""
         super().__init__()
@@ -49,6 +51,8 @@ class Object(dict[str, "Value"]):
 
 class Array(list["Value"]):
     """A JSON array: `at` holds the offset of each value, `begin` and `end` are its own."""
+
+    __slots__ = ("at", "begin", "end")
 
     def __init__(self, begin: int) -> None:
         """Start empty at offset `begin`."""

@@ -10,7 +10,17 @@ import math
 from collections.abc import Iterator
 
 from mavframecheck.missions.located import Array, Members, Object, Value, arrays, numbers, parse
-from mavframecheck.missions.planned import FENCE, MISSION, RALLY, Home, Item, Places, Planned, Said
+from mavframecheck.missions.planned import (
+    FENCE,
+    MISSION,
+    RALLY,
+    Home,
+    Item,
+    Places,
+    Planned,
+    Said,
+    bounded,
+)
 from mavframecheck.missions.text import MissionError, Text
 from mavframecheck.semantics.constants import constant
 
@@ -45,12 +55,17 @@ def read_plan(text: Text) -> Planned:
         planned.autopilot = mission.whole("firmwareType", most=255)
     if "vehicleType" in mission.box:
         planned.vehicle_type = mission.whole("vehicleType", most=255)
-    planned.items += _mission(mission, planned.notes)
-    if isinstance(root.box.get("geoFence"), Object):
-        planned.items += _fence(root.inner("geoFence"))
-    if isinstance(root.box.get("rallyPoints"), Object):
-        planned.items += _rally(root.inner("rallyPoints"))
+    planned.items += bounded(text, _items(root, mission, planned.notes))
     return planned
+
+
+def _items(root: Members, mission: Members, notes: list[str]) -> Iterator[Item]:
+    """Yield mission, fence and rally points."""
+    yield from _mission(mission, notes)
+    if root.box.get("geoFence") is not None:
+        yield from _fence(root.inner("geoFence"))
+    if root.box.get("rallyPoints") is not None:
+        yield from _rally(root.inner("rallyPoints"))
 
 
 def _what_else(root: Object, kind: Value) -> str:

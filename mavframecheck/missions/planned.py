@@ -6,6 +6,7 @@ Readers (`plan`, `wpl`, `points`) make a `Planned`; `upload` turns it into the b
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -102,3 +103,11 @@ class Planned:
     """MAV_TYPE (`vehicleType`)."""
     notes: list[str] = field(default_factory=list)
     """What a reader of the report should know."""
+
+
+def bounded(text: Text, items: Iterable[Item]) -> Iterator[Item]:
+    """Yield the items of a file; MissionError at the first one too many."""
+    for count, item in enumerate(items):
+        if count >= MOST_ITEMS:
+            text.fail(item.places.item, f"more than {MOST_ITEMS} items cannot be sent to a vehicle")
+        yield item

@@ -10,11 +10,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from itertools import islice
 
-from mavframecheck.missions.planned import FENCE, RALLY, Item, Places, Planned, Said
+from mavframecheck.missions.planned import FENCE, RALLY, Item, Places, Planned, Said, bounded
 from mavframecheck.missions.text import Text
 from mavframecheck.semantics.constants import constant
 
+_MOST_WORDS = 8
+"""Words of a line that are looked at."""
 _LINE = re.compile(r"[^\r\n]+")
 _WORD = re.compile(r"[^ \t,]+")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
@@ -27,7 +30,8 @@ _ABOVE_HOME = constant("MAV_FRAME.GLOBAL_RELATIVE_ALT")
 
 def read_points(text: Text) -> Planned:
     """Return the fence of a file of points: its return point, if it has one, and its corners."""
-    points = [_point(text, words, _CORNER, FENCE, _GLOBAL) for words in _lines(text)]
+    corners = (_point(text, words, _CORNER, FENCE, _GLOBAL) for words in _lines(text))
+    points = list(bounded(text, corners))
     has_return = (
         len(points) > 2 and _same(points[1], points[-1]) and not _same(points[0], points[-1])
     )
@@ -40,7 +44,10 @@ def read_points(text: Text) -> Planned:
 
 def read_rally(text: Text) -> Planned:
     """Return the rally points of a file."""
-    found = []
+    return Planned("rally", text, list(bounded(text, _rally_points(text))))
+
+
+def _rally_points(text: Text) -> Iterator[Item]:
     for words in _lines(text):
         if words[0][0] != "RALLY":
             text.fail(words[0].start(), "a line of a rally file begins with RALLY")
@@ -48,14 +55,13 @@ def read_rally(text: Text) -> Planned:
             text.fail(words[-1].end(), "latitude, longitude and altitude belong behind RALLY")
         point = _point(text, words[1:3], _RALLY, RALLY, _ABOVE_HOME)
         z, at = _number(text, words[3]), words[3].start()
-        found.append(point._replace(z=z, places=point.places._replace(z=at)))
-    return Planned("rally", text, found)
+        yield point._replace(z=z, places=point.places._replace(z=at))
 
 
 def _lines(text: Text) -> Iterator[list[re.Match[str]]]:
     """Yield the words of each line that says something."""
     for line in _LINE.finditer(text.content):
-        words = list(_WORD.finditer(text.content, line.start(), line.end()))
+        words = list(islice(_WORD.finditer(text.content, line.start(), line.end()), _MOST_WORDS))
         if words and not words[0][0].startswith("#"):
             yield words
 

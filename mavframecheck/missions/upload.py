@@ -18,7 +18,6 @@ import numpy.typing as npt
 from mavframecheck.missions.planned import (
     FENCE,
     MISSION,
-    MOST_ITEMS,
     RALLY,
     SAID,
     Home,
@@ -120,9 +119,6 @@ def _numbered(planned: Planned, autopilot: int | None) -> Iterator[Sent]:
         yield 0, Item(MISSION, _WAYPOINT, _GLOBAL, params, home.lat, home.lon, alt, places)
     for kind in (MISSION, FENCE, RALLY):
         items = [item for item in planned.items if item.mission_type == kind]
-        if len(items) > MOST_ITEMS:
-            problem = f"more than {MOST_ITEMS} items cannot be sent to a vehicle"
-            planned.text.fail(items[MOST_ITEMS].places.item, problem)
         yield from enumerate(items, first if kind == MISSION else 0)
 
 

@@ -10,9 +10,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from itertools import islice
 from typing import Final
 
-from mavframecheck.missions.planned import FENCE, MISSION, RALLY, Home, Item, Places, Planned, Said
+from mavframecheck.missions.planned import (
+    FENCE,
+    MISSION,
+    RALLY,
+    Home,
+    Item,
+    Places,
+    Planned,
+    Said,
+    bounded,
+)
 from mavframecheck.missions.text import Text
 from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.enums import AltRef
@@ -22,6 +33,8 @@ COLUMNS: Final = (
     *("number", "current", "frame", "command", "param1", "param2", "param3", "param4"),
     *("latitude", "longitude", "altitude", "autocontinue"),
 )
+_MOST_WORDS = len(COLUMNS) + 1
+"""Words of a line that are looked at."""
 _VERSIONS = {"110": True, "120": False}
 """Version -> whether the first item is home."""
 _HEADER = re.compile(r"\s*QGC[ \t]+WPL[ \t]+(\S+)[^\r\n]*")
@@ -54,7 +67,7 @@ def read_wpl(text: Text) -> Planned:
         text.fail(
             0, f"version {version[:20]} of waypoint files is not known here, only 110 and 120"
         )
-    planned = Planned("wpl", text, list(_items(text, header.end())))
+    planned = Planned("wpl", text, list(bounded(text, _items(text, header.end()))))
     if _VERSIONS[version] and planned.items:
         planned.home = _home(planned.items[0])
     return planned
@@ -71,7 +84,7 @@ def _home(first: Item) -> Home | None:
 
 def _items(text: Text, begin: int) -> Iterator[Item]:
     for line in _LINE.finditer(text.content, begin):
-        words = list(_WORD.finditer(text.content, line.start(), line.end()))
+        words = list(islice(_WORD.finditer(text.content, line.start(), line.end()), _MOST_WORDS))
         if words and not words[0][0].startswith("#"):
             yield _item(text, words)
 
@@ -105,7 +118,7 @@ def _wrong_columns(text: Text, words: list[re.Match[str]]) -> None:
     if len(words) < len(COLUMNS):
         missing = ", ".join(COLUMNS[len(words) :])
         text.fail(words[-1].end(), f"{len(words)} columns where 12 belong: {missing} missing")
-    text.fail(words[len(COLUMNS)].start(), f"{len(words)} columns where 12 belong")
+    text.fail(words[len(COLUMNS)].start(), "more than 12 columns")
 
 
 def _number(text: Text, column: int, word: re.Match[str]) -> float:

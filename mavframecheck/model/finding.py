@@ -153,9 +153,9 @@ class FileSummary(msgspec.Struct, frozen=True, kw_only=True):
     path: str
     """Path as given to `check`, or as found below a directory given."""
     kind: str
-    """What the content is: ``tlog``, ``raw``, ``pcap``, ``pcapng``..."""
+    """What the content is: ``tlog``, ``raw``, ``pcap``, ``pcapng``, ``plan``, ``wpl``..."""
     messages: int
-    """Good frames of known messages."""
+    """Good frames of known messages; items of a mission."""
     unknown: int
     """Frames whose id the dialect lacks."""
     bad_crc: int

@@ -103,8 +103,9 @@ def intended(vehicle: Vehicle) -> str:
 
 def extent(file: FileSummary) -> str:
     """Return what the file is, how long, how much: ``tlog, 42 s from 2026-01-01 00:00:00 UTC, 210 frames``."""
-    noun = "item" if file.kind in MISSION_KINDS else "frame"
-    frames = plural(file.messages, noun) if file.messages else "nothing could be decoded"
+    frames = plural(file.messages, "frame") if file.messages else "nothing could be decoded"
+    if file.kind in MISSION_KINDS:
+        frames = plural(file.messages, "item")
     start = f" from {utc(file.time_start)}" if file.time_start is not None else ""
     length = [duration(file.duration_s) + start] if file.duration_s is not None else []
     return ", ".join([file.kind, *length, frames])

@@ -182,7 +182,7 @@ def test_home_is_taken_from_item_0_only_where_it_can_be(tmp_path: Path) -> None:
     ("row", "words"),
     [
         ("1\t0\t3\t16\t0\t0\t0\t0\t47\t8\t30", "column 25: 11 columns where 12 belong: autocontinue"),
-        ("1 0 3 16 0 0 0 0 47 8 30 1 9", "13 columns where 12 belong"),
+        ("1 0 3 16 0 0 0 0 47 8 30 1 9", "column 28: more than 12 columns"),
         ("1 0 3 16 0 0 0 0 47,5 8 30 1", "column 18: latitude is '47,5', which is no number: write a point"),
         ("1 0 3 x 0 0 0 0 47 8 30 1", "command is 'x'"),
         ("1 0 3.5 16 0 0 0 0 47 8 30 1", "frame must be a whole number"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mavframecheck.missions import Transactions, read_mission
-from mavframecheck.missions import upload as upload_module
+from mavframecheck.missions import planned as planned_module
 from mavframecheck.missions.items import items_of
 from mavframecheck.missions.text import MissionError
 from mavframecheck.missions.upload import UNSET, Upload
@@ -97,7 +97,7 @@ def vars_of(place: Any) -> tuple[Any, ...]:
 def test_more_items_than_can_be_sent_are_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(upload_module, "MOST_ITEMS", 3)
+    monkeypatch.setattr(planned_module, "MOST_ITEMS", 3)
     row = "1 0 3 16 0 0 0 0 47.2 8.2 20 1\n"
     with pytest.raises(MissionError, match="line 5, column 1: more than 3 items"):
         upload(tmp_path, "QGC WPL 110\n" + row * 4, name="m.waypoints")
