@@ -29,6 +29,7 @@ from mavframecheck.model import MissionLocation
 from mavframecheck.semantics.constants import constant, entry_name
 from mavframecheck.semantics.mavframe import GLOBAL_FRAMES, METRIC_FRAMES
 from mavframecheck.semantics.names import family as family_of
+from mavframecheck.semantics.names import usual_vehicle
 from mavframecheck.wire import Batch, Dialect, Field, Frames, Layout, Table
 
 ITEM = "MISSION_ITEM_INT"
@@ -42,15 +43,6 @@ _WAYPOINT = constant("MAV_CMD.NAV_WAYPOINT")
 _GLOBAL = constant("MAV_FRAME.GLOBAL")
 _LIMIT = 2.0**62
 """Beyond this a number that is no place anyway is cut, so that it fits 64 bits."""
-_FROM_FAMILY = {
-    "px4": ("PX4", ""),
-    "arducopter": ("ARDUPILOTMEGA", "QUADROTOR"),
-    "arduplane": ("ARDUPILOTMEGA", "FIXED_WING"),
-    "ardurover": ("ARDUPILOTMEGA", "GROUND_ROVER"),
-    "ardusub": ("ARDUPILOTMEGA", "SUBMARINE"),
-}
-"""Autopilot family, as `--autopilot` names it -> MAV_AUTOPILOT and MAV_TYPE of such a vehicle."""
-
 _FLOATS = {"HOME_POSITION": frozenset({"latitude", "longitude", "altitude"})}
 """Integers on the wire that are not integers here, because NaN says "not known"."""
 
@@ -126,10 +118,10 @@ def _told(planned: Planned, family: str | None) -> tuple[int | None, int | None]
     """Return MAV_AUTOPILOT and MAV_TYPE: what `family` says, else the file."""
     if family is None:
         return planned.autopilot, planned.vehicle_type
-    name, default = _FROM_FAMILY[family]
-    autopilot, vehicle_type = constant(f"MAV_AUTOPILOT.{name}"), planned.vehicle_type
-    if default and family_of(autopilot, vehicle_type or 0) != family:
-        vehicle_type = constant(f"MAV_TYPE.{default}")
+    autopilot, usual = usual_vehicle(family)
+    vehicle_type = planned.vehicle_type
+    if family != "px4" and family_of(autopilot, vehicle_type or 0) != family:
+        vehicle_type = usual  # firmware of ArduPilot goes with the type, PX4 flies any
     return autopilot, vehicle_type
 
 
