@@ -92,7 +92,7 @@ def parse(text: Text) -> Value:
             at = match.start(5)
             value = Object(at) if opening == "{" else Array(at)
         _put(text, box, match, value, at)
-        if isinstance(value, Object | Array):
+        if opening is not None and isinstance(value, Object | Array):
             opened.append(value)
             if len(opened) > DEEPEST:
                 text.fail(at, f"more than {DEEPEST} levels of nesting: this is no mission")
@@ -249,8 +249,10 @@ class Members:
 
 def numbers(text: Text, array: Array) -> list[float]:
     """Return the numbers of an array, null as NaN."""
-    pairs = enumerate(zip(array, array.at, strict=True), 1)
-    return [_as_number(text, value, at, f"value {k}") for k, (value, at) in pairs]
+    return [
+        value if type(value) is float else _as_number(text, value, array.at[k], f"value {k + 1}")
+        for k, value in enumerate(array)
+    ]
 
 
 def arrays(text: Text, array: Array, lengths: tuple[int, ...]) -> Iterator[Array]:
@@ -269,8 +271,8 @@ def _array(text: Text, value: Value, at: int, called: str, lengths: tuple[int, .
 
 
 def _as_number(text: Text, value: Value, at: int, called: str) -> float:
-    if value is None:
-        return math.nan
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if type(value) is int or type(value) is float:
+        return float(value)
+    if value is not None:
         text.fail(at, f"{called} must be a number or null")
-    return float(value)
+    return math.nan
