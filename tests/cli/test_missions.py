@@ -52,6 +52,13 @@ def test_a_finding_names_line_column_item_and_command(run: Run, tmp_path: Path) 
     assert "6 mission items" in text
 
 
+def test_scaled_degrees_are_found_once_with_and_without_home(run: Run, tmp_path: Path) -> None:
+    scaled = item(lat=473978000, lon=85457000)
+    homeless = written(tmp_path, plan(scaled, plannedHomePosition=[0, 0, 0]), "a.plan")
+    assert [each["code"] for each in found(run, str(homeless))] == ["MFC304"]
+    assert [each["code"] for each in found(run, str(written(tmp_path, plan(scaled))))] == ["MFC306"]
+
+
 def test_directories_and_patterns_pick_missions_up_by_content(run: Run, tmp_path: Path) -> None:
     written(tmp_path, plan(item(22), SWAPPED), "mission.json")
     written(tmp_path, "QGC WPL 110\n0 1 0 16 0 0 0 0 47.3 8.5 488 1\n", "notes.txt")
