@@ -17,11 +17,12 @@ HOOK = (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8")
 ACTION = (ROOT / "action.yml").read_text("utf-8")
 
 
-def test_the_hook_takes_missions_and_leaves_recordings() -> None:
+def test_the_hook_takes_missions_and_recordings() -> None:
     files = re.compile(re.findall(r"^  files: (.*)$", HOOK, re.MULTILINE)[0])
     samples = [path.name for path in (ROOT / "samples").iterdir()]
     taken = {name for name in [*samples, "a.fen", "b.poly", "c.ral"] if files.search(name)}
-    assert {Path(name).suffix for name in taken} == {".plan", ".waypoints", ".fen", ".poly", ".ral"}
+    missions = {".plan", ".waypoints", ".fen", ".poly", ".ral"}
+    assert {Path(name).suffix for name in taken} == missions | {".tlog", ".pcap"}
     assert "entry: mavframecheck check\n" in HOOK
 
 
