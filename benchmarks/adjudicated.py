@@ -1,7 +1,7 @@
-"""`make accuracy`, second part: errors and warnings on real recordings, against what people confirmed.
+"""`make accuracy`, second part: errors and warnings on real recordings and missions, against what people confirmed.
 
 `expectations.toml` lists every error and warning on the real recordings with the reason why it is true,
-read from the bytes. One that it does not list is new: look at the bytes, then list it or mend the rule.
+read from the bytes; a file that cannot be read is listed as `failed`. One that it does not list is new: look at the bytes, then list it or mend the rule.
 It names a recording by its folder and the start of its SHA-256, since file names carry people's accounts.
 """
 
@@ -17,7 +17,7 @@ from typing import NamedTuple
 from benchmarks.corpus import Checked, check_all, check_arguments, is_absent
 
 EXPECTATIONS = Path(__file__).parent / "expectations.toml"
-FOLDERS = ("tlog", "raw", "pcap")
+FOLDERS = ("tlog", "raw", "pcap", "plan", "wpl")
 DIGITS = 16
 
 
@@ -46,7 +46,8 @@ def loud(checked: Checked, file: str) -> set[Key]:
     """Return the errors and warnings on the recording `file`, and say when it could not be checked."""
     if checked.failure:
         print(f"failed        {checked.path}  {checked.failure}")
-        return {Key(file, "failed", checked.failure)}
+        reason = checked.failure.replace(f"{checked.path}, ", "")
+        return {Key(file, "failed", reason)}
     return {
         Key(file, finding["code"], finding["subject"])
         for finding in checked.findings

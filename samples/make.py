@@ -1,4 +1,4 @@
-"""Write the samples: small recordings, each with one fault, the same bytes in every run.
+"""Write the samples: small recordings and missions, each with one fault, the same bytes in every run.
 
 ``make samples`` writes them beside this file, with a README.md that says what is wrong in each.
 """
@@ -16,7 +16,7 @@ from typing import Any
 import dpkt
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from samples import flight
+from samples import flight, missions
 from samples.flight import COMPANION, GCS, PX4, SETPOINT, START_US, Fields, Flight, Said
 
 HERE = Path(__file__).parent
@@ -336,6 +336,19 @@ SAMPLES = (
         "HOME_POSITION.q all zero instead of NaN: worth knowing.",
         faulty_field("HOME_POSITION", values(q=[0.0] * 4), always=True),
     ),
+    Sample("clean_mission.plan", (), "Nothing: a mission for PX4.", missions.plan()),
+    Sample(
+        "sea_level_height.plan",
+        ("MFC202",),
+        "One corner at 518 m above home, which is its height above mean sea level.",
+        missions.plan(missions.sea_level_height),
+    ),
+    Sample(
+        "swapped_waypoint.waypoints",
+        ("MFC305",),
+        "One corner with longitude first, latitude second.",
+        missions.waypoints(missions.swapped),
+    ),
 )  # fmt: skip
 
 
@@ -344,9 +357,11 @@ def readme() -> str:
     lines = ["| sample | what is wrong | codes |", "|---|---|---|"]
     lines += [f"| `{s.name}` | {s.wrong} | {', '.join(s.codes) or 'none'} |" for s in SAMPLES]
     return (
-        "# Samples\n\nSmall recordings of one simulated flight, each with one fault and its codes. "
-        "`make samples` writes\nthem and this page; what they hold is in `make.py` and the flight "
-        "in `flight.py`.\n\n" + "\n".join(lines) + "\n"
+        "# Samples\n\nSmall recordings of one simulated flight and missions over its home, each with one "
+        "fault and its codes.\n`make samples` writes them and this page; what they hold is in `make.py`, "
+        "the flight in `flight.py`\nand the missions in `missions.py`.\n\n"
+        + "\n".join(lines)
+        + "\n"
     )
 
 

@@ -22,7 +22,8 @@ def test_sample_is_what_the_script_writes(sample: Sample) -> None:
 
 def test_readme_lists_every_sample() -> None:
     """The page beside the samples is generated with them, and no sample is left over."""
-    recordings = {path.name for path in HERE.iterdir() if path.suffix in {".tlog", ".raw", ".pcap"}}
+    made = {".tlog", ".raw", ".pcap", ".plan", ".waypoints"}
+    recordings = {path.name for path in HERE.iterdir() if path.suffix in made}
 
     assert (HERE / "README.md").read_text(encoding="utf-8") == readme()
     assert recordings == {sample.name for sample in SAMPLES}

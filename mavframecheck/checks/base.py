@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.vehicle import Context
@@ -46,6 +46,9 @@ class Check(ABC):
 
     It must not depend on how the recording is cut into batches, and its memory must not grow with it.
     """
+
+    of_missions: ClassVar[bool] = False
+    """Whether it judges missions, so that it also runs on mission files."""
 
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Take the parameters of the rule that names the check, and the dialect of the recording."""

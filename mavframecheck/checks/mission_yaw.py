@@ -41,6 +41,8 @@ TURNS = frozenset(
 class ZeroYaw(Check):
     """Missions for a PX4 multirotor whose items all hold yaw 0, which turns the vehicle to north."""
 
+    of_missions = True
+
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Remember nothing yet."""
         super().__init__(params, dialect)

@@ -96,6 +96,8 @@ class AltitudeProfile(Check):
     numbers in the items are close to each other: then one of the frames is wrong.
     """
 
+    of_missions = True
+
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Remember nothing yet."""
         super().__init__(params, dialect)

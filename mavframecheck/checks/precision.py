@@ -112,6 +112,8 @@ class _Stream:
 class Float32Passage(Check):
     """Streams of degE7 positions that lie on the grid of 32-bit floats, value after value."""
 
+    of_missions = True
+
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no stream yet."""
         super().__init__(params, dialect)

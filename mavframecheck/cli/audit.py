@@ -27,8 +27,10 @@ class Audit(Files[Checked]):
 
     usage_errors = (*Files.usage_errors, engine.SettingsError, engine.RuleFileError)
 
-    def __init__(self, paths: Sequence[str], chosen: Chosen, jobs: int = 1) -> None:
-        super().__init__(paths, partial(_judge, chosen.pack, chosen.settings))
+    def __init__(
+        self, paths: Sequence[str], chosen: Chosen, jobs: int = 1, *, fix: bool = False
+    ) -> None:
+        super().__init__(paths, partial(_judge, chosen.pack, chosen.settings, fix), missions=True)
         self._chosen = chosen
         self._jobs = jobs
         self._worst = -1
@@ -87,8 +89,12 @@ class Audit(Files[Checked]):
 
 
 def _judge(
-    pack: engine.Pack, settings: engine.Settings, path: str, advance: Advance | None
+    pack: engine.Pack, settings: engine.Settings, fix: bool, path: str, advance: Advance | None
 ) -> tuple[Checked, int]:
-    """Judge one file, in whatever process."""
+    """Judge one file, in whatever process; `fix` first mends what is certain in it."""
+    if fix:
+        from mavframecheck.cli.mend import mend_in_place
+
+        mend_in_place(path, pack, settings)
     checked = Checked(*engine.check_file(path, pack, settings, advance))
     return checked, checked.file.messages

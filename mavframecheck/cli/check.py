@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -17,9 +17,10 @@ if TYPE_CHECKING:
     from mavframecheck.cli.settings import Chosen
 
 _EXAMPLE = """\
-Give a recording, a directory of them, or - for standard input. For example:
+Give a recording or mission, a directory of them, or - for standard input. For example:
 
   mavframecheck check flight.tlog
+  mavframecheck check mission.plan
   mavframecheck check logs/ --fail-on error
   mavframecheck check flight.tlog --select MFC1,MFC302 --format json
 
@@ -61,6 +62,12 @@ Give a recording, a directory of them, or - for standard input. For example:
     help="Judge recordings as they appear in this directory and are complete, until Ctrl-C.",
 )
 @click.option(
+    "--fix",
+    is_flag=True,
+    help="Mend in mission files what is certain, and judge what is left.",
+)
+@click.option("--diff", is_flag=True, help="Only show what --fix would change.")
+@click.option(
     "-v",
     "--verbose",
     is_flag=True,
@@ -78,6 +85,8 @@ def check(
     show_settings: bool,
     jobs: int,
     watch: Path | None,
+    fix: bool,
+    diff: bool,
     **options: Any,
 ) -> None:
     """Judge recordings and missions: files, directories, or - for standard input.
@@ -90,11 +99,15 @@ def check(
         return
     if paths and watch:
         raise click.UsageError("give either PATH or --watch DIR")
+    if watch and (fix or diff):
+        raise click.UsageError("--fix and --diff are for files that are named, not for --watch")
     if not (paths or watch):
         click.echo(_EXAMPLE, err=True, nl=False)
         ctx.exit(2)
     chosen = choose(**options)
-    audit = _audit(paths, watch, chosen, jobs or os.cpu_count() or 1)
+    if diff:
+        _show_diff(ctx, paths, chosen)
+    audit = _audit(paths, watch, chosen, jobs or os.cpu_count() or 1, fix=fix)
     context = page_context(verbose=verbose)._replace(
         rules=tuple(chosen.pack.rules), fail_on=chosen.fail_on, remarks=audit.remarks
     )
@@ -103,14 +116,24 @@ def check(
     ctx.exit(audit.exit_code())
 
 
-def _audit(paths: tuple[str, ...], watch: Path | None, chosen: Chosen, jobs: int) -> Audit:
+def _show_diff(ctx: click.Context, paths: tuple[str, ...], chosen: Chosen) -> NoReturn:
+    from mavframecheck.cli.mend import Diffs
+
+    diffs = Diffs(paths, chosen.pack, chosen.settings)
+    echo(diffs.results())
+    ctx.exit(diffs.verdict())
+
+
+def _audit(
+    paths: tuple[str, ...], watch: Path | None, chosen: Chosen, jobs: int, *, fix: bool
+) -> Audit:
     if watch:
         from mavframecheck.cli.vigil import Vigil
 
         return Vigil(watch, chosen)
     from mavframecheck.cli.audit import Audit
 
-    return Audit(paths, chosen, jobs)
+    return Audit(paths, chosen, jobs, fix=fix)
 
 
 def _default_format() -> str:

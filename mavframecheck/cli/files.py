@@ -32,9 +32,11 @@ class Files(Generic[Result]):
     usage_errors: tuple[type[Exception], ...] = (DialectError,)
     """What no file is to blame for."""
 
-    def __init__(self, paths: Sequence[str], read: Read[Result]) -> None:
+    def __init__(self, paths: Sequence[str], read: Read[Result], *, missions: bool = False) -> None:
+        """Read what `paths` stand for; with `missions` also the mission files in directories."""
         self._paths = paths
         self._read = read
+        self._missions = missions
         self._unreadable = 0
         self._refused = 0
         self._frames = 0
@@ -86,12 +88,14 @@ class Files(Generic[Result]):
             except (SourceError, OSError) as error:
                 self._fail(path, error)
                 continue
-            if found.missions:
-                skipped = plural(len(found.missions), "mission")
-                complain(f"{sentence(path)}: {skipped} skipped: not read yet")
-            if not found.recordings:
-                complain(f"{sentence(path)}: no recording in this directory")
-            files.update((str(each), None) for each in found.recordings)
+            wanted = [*found.recordings, *(found.missions if self._missions else ())]
+            if found.missions and not self._missions:
+                skipped = plural(len(found.missions), "mission file")
+                complain(f"{sentence(path)}: {skipped} skipped: 'mavframecheck check' judges them")
+            if not wanted:
+                sought = "recording or mission" if self._missions else "recording"
+                complain(f"{sentence(path)}: no {sought} in this directory")
+            files.update((str(each), None) for each in wanted)
         return list(files)
 
     def _one(self, path: str, outcome: Any) -> Iterator[Result]:

@@ -56,7 +56,7 @@ _OPTIONS = (
     click.option(
         "--autopilot",
         type=click.Choice(get_args(Autopilot)),
-        help="What the vehicle is, where the recording does not say.",
+        help="What the vehicle is, where a recording does not say; in mission files whatever they say.",
     ),
     click.option(
         "--dialect",

@@ -4,7 +4,7 @@ from mavframecheck.engine.check import check_file, check_recording
 from mavframecheck.engine.choices import parameter, selectors, similar
 from mavframecheck.engine.compiled import Pack
 from mavframecheck.engine.expression import RuleFileError
-from mavframecheck.engine.pack import load_pack
+from mavframecheck.engine.pack import chosen_rules, load_pack
 from mavframecheck.engine.settings import Settings, SettingsError
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "SettingsError",
     "check_file",
     "check_recording",
+    "chosen_rules",
     "load_pack",
     "parameter",
     "selectors",

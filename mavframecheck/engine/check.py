@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-from mavframecheck.engine.compiled import Pack
+from mavframecheck.checks import load_check
+from mavframecheck.engine.compiled import CompiledRule, Pack
 from mavframecheck.engine.pack import chosen_rules
 from mavframecheck.engine.reading import Progress, Reading
 from mavframecheck.engine.runner import Runner
 from mavframecheck.engine.settings import Settings
-from mavframecheck.model import FileReport, Finding
-from mavframecheck.sources import Recording, open_recording
+from mavframecheck.missions import read_mission
+from mavframecheck.missions.upload import ITEM, Upload
+from mavframecheck.model import FileReport, Finding, RuleRun, Vehicle
+from mavframecheck.semantics.names import family, type_name
+from mavframecheck.sources import MISSIONS, RECORDINGS, Recording, open_recording
+from mavframecheck.vehicle import Context
 from mavframecheck.wire import Dialect, load_dialect
 
 
 def check_file(
     path: str, pack: Pack, settings: Settings, progress: Progress | None = None
 ) -> tuple[FileReport, tuple[Finding, ...]]:
-    """Judge the recording at `path` (``-``: standard input).
+    """Judge the recording or mission file at `path` (``-``: standard input).
 
-    `progress` is told how many bytes were read so far. Raises `SourceError` when the recording cannot
+    `progress` is told how many bytes were read so far. Raises `SourceError` when the file cannot
     be read, `DialectError` or `RuleFileError` when dialect or rules cannot be used.
     """
     dialect = load_dialect(settings.dialect)
-    with open_recording(path, settings.input_kind) as recording:
+    with open_recording(path, settings.input_kind, RECORDINGS | MISSIONS) as recording:
+        if recording.kind in MISSIONS:
+            return check_mission(recording, pack, settings, dialect)
         return check_recording(recording, pack, settings, dialect, progress)
 
 
@@ -46,3 +53,54 @@ def check_recording(
         runs=tuple(runs),
     )
     return report, tuple(findings)
+
+
+def check_mission(
+    file: Recording, pack: Pack, settings: Settings, dialect: Dialect
+) -> tuple[FileReport, tuple[Finding, ...]]:
+    """Judge an open mission file with the rules that can be about mission items."""
+    planned = read_mission(file)
+    upload = Upload(planned, dialect, settings.autopilot)
+    chosen = chosen_rules(pack, settings)
+    rules = [rule for rule in chosen if _of_missions(rule)]
+    runner = Runner(file.name, rules, Context(), dialect, upload)
+    runner.update(upload.batch)
+    findings, runs = runner.finish()
+    reason = "a mission file holds nothing that the rule is about"
+    idle = [
+        RuleRun(code=rule.rule.code, status="not-applicable", reason=reason)
+        for rule in chosen
+        if rule not in rules
+    ]
+    report = FileReport(
+        path=file.name,
+        kind=str(file.kind),
+        messages=len(upload),
+        unknown=0,
+        bad_crc=0,
+        skipped_bytes=0,
+        duration_s=None,
+        time_start=None,
+        notes=tuple(planned.notes),
+        vehicles=_vehicles(upload),
+        damage=(),
+        damage_total=0,
+        runs=tuple(sorted((*runs, *idle), key=lambda run: run.code)),
+    )
+    return report, tuple(findings)
+
+
+def _of_missions(rule: CompiledRule) -> bool:
+    """Return whether a rule can be about mission items."""
+    check = rule.rule.detect.check
+    return load_check(check).of_missions if check else rule.may_judge(ITEM)
+
+
+def _vehicles(upload: Upload) -> tuple[Vehicle, ...]:
+    """Return the vehicle that a mission is for, where that is known."""
+    if upload.told is None:
+        return ()
+    autopilot, vehicle_type = upload.told
+    named = None if vehicle_type is None else type_name(vehicle_type)
+    found = family(autopilot, vehicle_type or 0)
+    return (Vehicle(sysid=1, compid=1, role="autopilot", autopilot=found, type=named),)

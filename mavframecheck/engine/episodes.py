@@ -12,7 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.engine.compiled import CompiledRule
-from mavframecheck.model import ByteLocation, Evidence, Finding, Persist, Severity, Subject
+from mavframecheck.model import (
+    ByteLocation,
+    Evidence,
+    Finding,
+    MissionLocation,
+    Persist,
+    Severity,
+    Subject,
+)
 from mavframecheck.wire import Frames
 
 MAX_EPISODES = 50
@@ -24,6 +32,8 @@ GAP_US = 10_000_000
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
+Locate = Callable[[int, str | None], MissionLocation]
+"""Says where in a mission file a frame number, and a field of it, stand."""
 
 
 class Mark(NamedTuple):
@@ -58,6 +68,8 @@ class Judged(NamedTuple):
     """Subject of the row at a place."""
     describe: Callable[[int], Words]
     """Words for the hit at a place."""
+    timeless: bool = False
+    """Whether nothing says how far apart rows are: then a row that is right ends an episode."""
 
 
 @dataclass(slots=True)
@@ -100,9 +112,10 @@ class _Stream:
 class Episodes:
     """Collects hits into episodes, and episodes into findings."""
 
-    def __init__(self, file: str) -> None:
-        """Collect for the recording called `file`."""
+    def __init__(self, file: str, locate: Locate | None = None) -> None:
+        """Collect for the recording called `file`, or, with `locate`, for a mission file."""
         self._file = file
+        self._locate = locate
         self._streams: dict[tuple[str, str, str | None], dict[int, _Stream]] = {}
         self._observed: list[Episode] = []
 
@@ -113,6 +126,7 @@ class Episodes:
     def collect(self, rule: CompiledRule, message: str, label: str | None, judged: Judged) -> None:
         """Add rows in frame order; rows of one stream must come in the order in which they were sent."""
         streams = self._streams.setdefault((rule.rule.code, message, label), {})
+        judged = judged._replace(timeless=self._locate is not None)
         hits = np.flatnonzero(judged.hit)
         fresh = [s for s in dict.fromkeys(judged.stream[hits].tolist()) if s not in streams]
         for stream in fresh[: MAX_STREAMS - len(streams)]:
@@ -135,7 +149,7 @@ class Episodes:
         ]
         lasting = [e for e in (*collected, *self._observed) if e.lasts]
         lasting.sort(key=lambda e: (e.first.number, e.rule.rule.code, str(e.subject)))
-        return [_finding(e, self._file) for e in lasting]
+        return [_finding(e, self._file, self._locate) for e in lasting]
 
 
 def _extend(stream: _Stream, rule: CompiledRule, judged: Judged, places: Ints) -> None:
@@ -160,7 +174,8 @@ def _runs(judged: Judged, places: Ints, ranks: Ints) -> list[Ints]:
     if not len(ranks):
         return []
     t_us, valid = judged.frames.t_us[places[ranks]], judged.frames.t_valid[places[ranks]]
-    apart = (np.diff(ranks) > 1) & valid[1:] & valid[:-1] & (np.abs(np.diff(t_us)) > GAP_US)
+    apart = valid[1:] & valid[:-1] & (np.abs(np.diff(t_us)) > GAP_US)
+    apart = (np.diff(ranks) > 1) & (apart | judged.timeless)
     return np.split(ranks, np.flatnonzero(apart) + 1)
 
 
@@ -178,7 +193,10 @@ def _add_run(
     badness = float(judged.badness[worst])
     current = stream.episodes[-1] if stream.episodes else None
     full = len(stream.episodes) >= MAX_EPISODES
-    if current is not None and (full or _continues(current, first, right_before)):
+    goes_on = current is not None and (
+        right_before == 0 if judged.timeless else _continues(current, first, right_before)
+    )
+    if current is not None and (full or goes_on):
         current.judged += right_before + length
         current.count += len(hits)
         current.last = last
@@ -216,8 +234,16 @@ def _mark(frames: Frames, place: int) -> Mark:
     return Mark(int(frames.number[place]), t_us, int(frames.offset[place]), int(frames.size[place]))
 
 
-def _finding(episode: Episode, file: str) -> Finding:
+def _finding(episode: Episode, file: str, locate: Locate | None) -> Finding:
     rule, subject, words = episode.rule.rule, episode.subject, episode.words
+    location: ByteLocation | MissionLocation = ByteLocation(
+        episode.first.offset, episode.first.size
+    )
+    item = ""
+    if locate is not None:
+        location = locate(episode.first.number, subject.field)
+        subject = Subject(None, None, subject.message, subject.field)
+        item = f"{location.item} {location.command}"
     return Finding(
         code=rule.code,
         name=rule.name,
@@ -234,18 +260,22 @@ def _finding(episode: Episode, file: str) -> Finding:
         utc_first=_utc(episode.first),
         utc_last=_utc(episode.last),
         count=episode.count,
-        location=ByteLocation(episode.first.offset, episode.first.size),
+        location=location,
         related=words.related,
-        fingerprint=fingerprint(rule.code, subject),
+        fingerprint=fingerprint(rule.code, subject, item),
         evidence=words.evidence,
         text=words.text,
         fix=words.fix,
     )
 
 
-def fingerprint(code: str, subject: Subject) -> str:
-    """Return a key that is the same for the same mistake of the same stream in another recording."""
-    return hashlib.sha256(f"{code}|{subject}".encode()).hexdigest()[:16]
+def fingerprint(code: str, subject: Subject, item: str = "") -> str:
+    """Return a key that is the same for the same mistake of the same stream in another recording.
+
+    In a mission file it is of the same `item` in another version of the file.
+    """
+    words = "|".join(filter(None, (code, str(subject), item)))
+    return hashlib.sha256(words.encode()).hexdigest()[:16]
 
 
 def _seconds(mark: Mark) -> float | None:

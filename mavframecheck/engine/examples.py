@@ -11,6 +11,7 @@ from mavframecheck.engine.compiled import Pack
 from mavframecheck.engine.settings import Settings
 from mavframecheck.model import Example, FileReport, Finding, Rule, Step
 from mavframecheck.semantics.constants import constant
+from mavframecheck.semantics.names import usual_vehicle
 from mavframecheck.sources import Recording
 from mavframecheck.wire import Dialect, load_dialect
 from mavframecheck.wire.encode import encode_frame, encode_payload, stamped
@@ -20,14 +21,6 @@ CONTEXT_S = 0.5
 """Context is said this long before the first step."""
 
 SENDERS = {"autopilot": (1, 1), "gcs": (255, 190), "companion": (1, 191), "camera": (1, 100)}
-
-_AUTOPILOTS = {
-    "px4": ("MAV_AUTOPILOT.PX4", "MAV_TYPE.QUADROTOR"),
-    "arducopter": ("MAV_AUTOPILOT.ARDUPILOTMEGA", "MAV_TYPE.QUADROTOR"),
-    "arduplane": ("MAV_AUTOPILOT.ARDUPILOTMEGA", "MAV_TYPE.FIXED_WING"),
-    "ardurover": ("MAV_AUTOPILOT.ARDUPILOTMEGA", "MAV_TYPE.GROUND_ROVER"),
-    "ardusub": ("MAV_AUTOPILOT.ARDUPILOTMEGA", "MAV_TYPE.SUBMARINE"),
-}
 
 
 class _Writer:
@@ -105,7 +98,7 @@ def recording(example: Example, dialect: Dialect) -> bytes:
 def _context_steps(context: dict[str, Any]) -> Iterator[Step]:
     """Yield the messages that say what `context` tells: autopilot, position, home."""
     if "autopilot" in context:
-        autopilot, mav_type = _AUTOPILOTS[context["autopilot"]]
+        autopilot, mav_type = usual_vehicle(context["autopilot"])
         fields = {"autopilot": autopilot, "type": mav_type, "mavlink_version": 3}
         yield Step(message="HEARTBEAT", sender="autopilot", fields=fields)
     if "home" in context:

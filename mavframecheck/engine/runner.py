@@ -13,6 +13,7 @@ from mavframecheck.engine.episodes import Bools, Episode, Episodes, Judged, Mark
 from mavframecheck.engine.scope import RuleScope, ValueScope
 from mavframecheck.engine.template import Template, first_value, plain
 from mavframecheck.engine.waiting import Queue
+from mavframecheck.missions.upload import ITEM, Upload
 from mavframecheck.model import Evidence, Finding, RuleRun, Scalar, Severity, Subject
 from mavframecheck.vehicle import NAMES, Context
 from mavframecheck.vehicle.rows import Rows
@@ -77,9 +78,17 @@ class Runner:
     """Judges one recording with some rules."""
 
     def __init__(
-        self, file: str, rules: list[CompiledRule], context: Context, dialect: Dialect
+        self,
+        file: str,
+        rules: list[CompiledRule],
+        context: Context,
+        dialect: Dialect,
+        upload: Upload | None = None,
     ) -> None:
-        """Judge the recording called `file` with `rules`, learning `context` on the way."""
+        """Judge the recording called `file` with `rules`, learning `context` on the way.
+
+        With `upload` the file is a mission: only its items are judged, and findings are placed in its text.
+        """
         self._rules = [rule for rule in rules if not rule.rule.detect.check]
         self._checks: list[tuple[CompiledRule, Check]] = [
             (rule, load_check(rule.rule.detect.check)(rule.params, dialect))
@@ -87,7 +96,8 @@ class Runner:
             if rule.rule.detect.check
         ]
         self._context = context
-        self._episodes = Episodes(file)
+        self._episodes = Episodes(file, upload.locate if upload is not None else None)
+        self._judged = None if upload is None else {ITEM}
         self._halls: dict[str, list[_Hall]] = {}
         self._tallies = {rule.rule.code: _Tally() for rule in self._rules}
 
@@ -121,6 +131,8 @@ class Runner:
 
     def _halls_for(self, message: str) -> list[_Hall]:
         """Return the rules on a message by whom they listen to."""
+        if self._judged is not None and message not in self._judged:
+            return []
         if message not in self._halls:
             halls: dict[tuple[str, ...], _Hall] = {}
             for rule in self._rules:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.missions.planned import SAID
 from mavframecheck.semantics.mavframe import GLOBAL_FRAMES, METRIC_FRAMES
 from mavframecheck.wire import Frames, Table
 from mavframecheck.wire.frames import join as join_frames
@@ -36,6 +37,8 @@ class Items:
     """Longitude in degrees, metres, or the bare number."""
     z: Floats
     """Metres above the reference of the frame (down in NED and FRD)."""
+    said: dict[str, Floats] = field(default_factory=dict)
+    """What only a file says (`planned.Said`), by the names in `SAID`; empty in a log."""
 
     def __len__(self) -> int:
         """Return the number of items."""
@@ -43,7 +46,9 @@ class Items:
 
     def take(self, rows: Ints) -> Items:
         """Return the items at `rows`."""
-        return Items(self.frames.take(rows), *(getattr(self, name)[rows] for name in _COLUMNS))
+        columns = {name: getattr(self, name)[rows] for name in _COLUMNS}
+        said = {name: column[rows] for name, column in self.said.items()}
+        return replace(self, frames=self.frames.take(rows), said=said, **columns)
 
 
 def items_of(table: Table) -> Items:
@@ -62,12 +67,12 @@ def items_of(table: Table) -> Items:
         x=table["x"] * scale,
         y=table["y"] * scale,
         z=table["z"].astype(float),
+        said={name: table[name] for name in SAID if name in table.layout.by_name},
     )
 
 
 def join(parts: list[Items]) -> Items:
     """Return the items of `parts`, one after the other."""
-    return Items(
-        join_frames([part.frames for part in parts]),
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS),
-    )
+    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS}
+    said = {name: np.concatenate([part.said[name] for part in parts]) for name in parts[0].said}
+    return Items(join_frames([part.frames for part in parts]), **columns, said=said)

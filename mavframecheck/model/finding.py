@@ -13,6 +13,10 @@ Evidence: TypeAlias = dict[str, Scalar]
 """`expected`, `observed`, `unit`, `frame` and what else the rule found worth saying."""
 
 
+MISSION_KINDS = frozenset({"plan", "wpl", "points", "rally"})
+"""`FileSummary.kind` of mission files; every other kind is a recording."""
+
+
 class ByteLocation(msgspec.Struct, frozen=True):
     """A place in a recording."""
 
@@ -160,9 +164,9 @@ class FileSummary(msgspec.Struct, frozen=True, kw_only=True):
     path: str
     """Path as given to `check`, or as found below a directory given."""
     kind: str
-    """What the content is: ``tlog``, ``raw``, ``pcap``, ``pcapng``..."""
+    """What the content is: ``tlog``, ``raw``, ``pcap``, ``pcapng``, ``plan``, ``wpl``..."""
     messages: int
-    """Good frames of known messages."""
+    """Good frames of known messages; items of a mission."""
     unknown: int
     """Frames whose id the dialect lacks."""
     bad_crc: int

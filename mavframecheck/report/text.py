@@ -17,6 +17,7 @@ from mavframecheck.model import (
     MissionLocation,
     Subject,
 )
+from mavframecheck.model.finding import MISSION_KINDS
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.layout import SEVERITY_COLOURS, Page
@@ -24,6 +25,7 @@ from mavframecheck.report.verdict import Census, found, judged
 from mavframecheck.report.words import (
     component,
     elapsed,
+    intended,
     is_number,
     plural,
     scalar,
@@ -84,6 +86,10 @@ def _file(checked: Checked, page: Page) -> Iterator[str]:
 def _head(file: FileReport, page: Page) -> Iterator[str]:
     yield page.bold(sentence(file.path))
     yield from page.wrap(what_was_read(file), "  ", "    ")
+    if file.kind in MISSION_KINDS:
+        yield from (f"  for {intended(vehicle)}" for vehicle in file.vehicles)
+        yield from _notes(file, page)
+        return
     speakers = file.vehicles if page.context.verbose else file.vehicles[:_MOST_COMPONENTS]
     ids = [f"{vehicle.sysid}/{vehicle.compid}" for vehicle in speakers]
     column = max((len(text) for text in ids), default=0) + 2
@@ -91,6 +97,10 @@ def _head(file: FileReport, page: Page) -> Iterator[str]:
         yield from page.wrap(component(vehicle), f"  {text:{column}}", " " * (column + 2))
     if len(file.vehicles) > len(speakers):
         yield f"  and {plural(len(file.vehicles) - len(speakers), 'more sender')} (--verbose)"
+    yield from _notes(file, page)
+
+
+def _notes(file: FileReport, page: Page) -> Iterator[str]:
     for note in file.notes:
         yield from page.wrap(f"note: {note}", "  ", "    ")
 
@@ -111,13 +121,19 @@ def _findings(file: FileReport, findings: Sequence[Finding], page: Page) -> Iter
 
 
 def _sorted(findings: Sequence[Finding]) -> list[Finding]:
-    """Return the findings by stream, within it the worst first, then in order of time."""
+    """Return the findings by stream, within it the worst first, then in order of time or line."""
 
-    def key(finding: Finding) -> tuple[int, int, str, int, bool, float]:
+    def key(finding: Finding) -> tuple[int, int, str, int, bool, float, int]:
         stream = _number(finding.sysid), _number(finding.compid), finding.message_name or ""
-        return *stream, _rank(finding), finding.time_first is None, finding.time_first or 0.0
+        time = finding.time_first is None, finding.time_first or 0.0
+        return *stream, _rank(finding), *time, _line(finding)
 
     return sorted(findings, key=key)
+
+
+def _line(finding: Finding) -> int:
+    location = finding.location
+    return (location.line or 0) if isinstance(location, MissionLocation) else 0
 
 
 def _number(component: int | None) -> int:
@@ -185,13 +201,14 @@ def _where(finding: Finding) -> str:
     match finding.location:
         case ByteLocation(offset=offset):
             return f"first at byte {offset}" if finding.count > 1 else f"byte {offset}"
-        case MissionLocation(line=line, item=item, command=command):
+        case MissionLocation(line=line, column=column, item=item, command=command):
             parts = (
                 f"line {line}" if line is not None else "",
+                f"column {column}" if column is not None else "",
                 f"item {item}" if item is not None else "",
                 command or "",
             )
-            return ", ".join(filter(None, parts))
+            return ("first in " if finding.count > 1 else "") + ", ".join(filter(None, parts))
     return ""
 
 

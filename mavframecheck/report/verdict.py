@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 from mavframecheck.model import FileReport, Finding, RuleRun, Severity, Subject
+from mavframecheck.model.finding import MISSION_KINDS
 from mavframecheck.report import Checked
 from mavframecheck.report.words import autopilot, plural, shortened
 
@@ -84,18 +85,28 @@ def judged(files: Sequence[FileReport], *, verbose: bool = False) -> str:
     """Return how much was judged, and by what idea of the vehicle; `verbose` says all there is to say."""
     ends = Counter(verdicts(chain.from_iterable(file.runs for file in files)).values())
     idle = ends["not-applicable"] + ends["insufficient-data"]
-    checksums = sum(file.bad_crc for file in files)
     parts = [
         f"{plural(ends['ran'], 'rule')} ran",
         f"{ends['not-applicable']} not applicable",
         f"{ends['insufficient-data']} insufficient"
         + (" (see --verbose)" if idle and not verbose else ""),
-        plural(sum(file.messages for file in files), "frame"),
-        *([plural(checksums, "bad checksum")] if checksums else []),
-        f"{plural(sum(file.skipped_bytes for file in files), 'byte')} skipped",
+        *_read(files),
         _vehicles(files),
     ]
     return ", ".join(parts)
+
+
+def _read(files: Sequence[FileReport]) -> Iterator[str]:
+    """Yield how much was read of recordings, and of missions."""
+    missions = [file for file in files if file.kind in MISSION_KINDS]
+    recordings = [file for file in files if file.kind not in MISSION_KINDS]
+    if missions:
+        yield plural(sum(file.messages for file in missions), "mission item")
+    if recordings:
+        checksums = sum(file.bad_crc for file in recordings)
+        yield plural(sum(file.messages for file in recordings), "frame")
+        yield from [plural(checksums, "bad checksum")] if checksums else []
+        yield f"{plural(sum(file.skipped_bytes for file in recordings), 'byte')} skipped"
 
 
 def verdicts(runs: Iterable[RuleRun]) -> dict[str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 
 from mavframecheck.model import Vehicle
-from mavframecheck.model.finding import FileSummary
+from mavframecheck.model.finding import MISSION_KINDS, FileSummary
 from mavframecheck.report.escape import sentence
 from mavframecheck.semantics.names import FAMILY_NAMES
 
@@ -91,9 +91,16 @@ def component(vehicle: Vehicle) -> str:
     return f"{role}, {kind}" if kind else role
 
 
+def intended(vehicle: Vehicle) -> str:
+    """Return what a mission is for: no file says which version."""
+    return component(vehicle).replace(" of unknown version", "")
+
+
 def extent(file: FileSummary) -> str:
     """Return what the file is, how long, how much: ``tlog, 42 s from 2026-01-01 00:00:00 UTC, 210 frames``."""
     frames = plural(file.messages, "frame") if file.messages else "nothing could be decoded"
+    if file.kind in MISSION_KINDS:
+        frames = plural(file.messages, "item")
     start = f" from {utc(file.time_start)}" if file.time_start is not None else ""
     length = [duration(file.duration_s) + start] if file.duration_s is not None else []
     return ", ".join([file.kind, *length, frames])

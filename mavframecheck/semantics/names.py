@@ -55,6 +55,14 @@ def family(autopilot: int, mav_type: int) -> Family:
     return "other"
 
 
+def usual_vehicle(family: str) -> tuple[int, int]:
+    """Return the MAV_AUTOPILOT, and the most usual MAV_TYPE, that a HEARTBEAT of a family announces."""
+    if family == "px4":
+        return constant("MAV_AUTOPILOT.PX4"), constant("MAV_TYPE.QUADROTOR")
+    usual = {str(name): types[0] for name, types in _ARDUPILOT_TYPES.items()}[family]
+    return constant("MAV_AUTOPILOT.ARDUPILOTMEGA"), constant(f"MAV_TYPE.{usual}")
+
+
 def type_name(mav_type: int) -> str:
     """Return `QUADROTOR` for 2."""
     return entry_name("MAV_TYPE", mav_type)

@@ -22,7 +22,7 @@ class Inputs(NamedTuple):
     recordings: list[Path | Stdin]
     """Files named by the user, whatever they are, and the recordings found in directories."""
     missions: list[Path]
-    """Mission files met in directories, which are not read yet."""
+    """Mission files met in directories."""
 
 
 def expand(paths: Sequence[str]) -> Inputs:

@@ -54,6 +54,13 @@ class Recording:
         except OSError as error:
             raise SourceError(_plain(self.name, error)) from error
 
+    def content(self, most: int) -> bytes:
+        """Return the whole content, but no more than `most` bytes."""
+        try:
+            return self._stream.read(most)
+        except OSError as error:
+            raise SourceError(_plain(self.name, error)) from error
+
     def close(self) -> None:
         """Close the file behind it; standard input stays open."""
         if self.name != _STDIN_NAME:
@@ -71,10 +78,12 @@ class Recording:
         self.close()
 
 
-def open_recording(path: str | Path, input_kind: str | None = None) -> Recording:
+def open_recording(
+    path: str | Path, input_kind: str | None = None, kinds: frozenset[Kind] | None = RECORDINGS
+) -> Recording:
     """Open a file, or standard input for `-`; `input_kind` overrules what the content looks like.
 
-    Raises SourceError when it cannot be read or is nothing that holds MAVLink.
+    Raises SourceError when it cannot be read or is none of `kinds` (None: whatever it is).
     """
     kind = _chosen(input_kind)
     name, file = _open(path)
@@ -82,7 +91,7 @@ def open_recording(path: str | Path, input_kind: str | None = None) -> Recording
         if path != STDIN:
             opened.callback(file.close)
         recording = Recording(name, file, kind)
-        if recording.kind not in RECORDINGS:
+        if kinds is not None and recording.kind not in kinds:
             raise NoRecordingError(f"{name}: this {REFUSALS[recording.kind]}")
         opened.pop_all()  # from here on the recording closes it
     return recording

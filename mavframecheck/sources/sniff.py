@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.model.finding import MISSION_KINDS
 from mavframecheck.sources.stream import ByteStream
 
 SNIFF_BYTES = 256 * 1024
@@ -33,6 +34,8 @@ class Kind(StrEnum):
     PCAPNG = "pcapng"
     PLAN = "plan"
     WPL = "wpl"
+    POINTS = "points"
+    RALLY = "rally"
     DATAFLASH = "dataflash"
     DATAFLASH_TEXT = "dataflash-text"
     ULOG = "ulog"
@@ -48,12 +51,15 @@ class Kind(StrEnum):
 
 
 RECORDINGS = frozenset({Kind.TLOG, Kind.RAW, Kind.PCAP, Kind.PCAPNG})
-MISSIONS = frozenset({Kind.PLAN, Kind.WPL})
+MISSIONS = frozenset(Kind(kind) for kind in MISSION_KINDS)
 
+_NO_RECORDING = "no recording: 'mavframecheck check' judges it"
 _RECORD_A_TLOG = "record a tlog with a ground station or MAVProxy"
 REFUSALS: dict[Kind, str] = {
-    Kind.PLAN: "is a QGroundControl plan, and missions are not read yet: give a tlog of the flight",
-    Kind.WPL: "is a waypoint file, and missions are not read yet: give a tlog of the flight",
+    Kind.PLAN: f"is a QGroundControl plan, {_NO_RECORDING}",
+    Kind.WPL: f"is a waypoint file, {_NO_RECORDING}",
+    Kind.POINTS: f"is a file of fence or polygon points, {_NO_RECORDING}",
+    Kind.RALLY: f"is a file of rally points, {_NO_RECORDING}",
     Kind.DATAFLASH: "is an ArduPilot DataFlash log from the vehicle's card, which holds no MAVLink: "
     "take the .tlog of the same flight from the ground station",
     Kind.DATAFLASH_TEXT: "is an ArduPilot DataFlash log in text form, which holds no MAVLink: "
@@ -66,7 +72,8 @@ REFUSALS: dict[Kind, str] = {
     Kind.SQLITE: f"is an SQLite database (perhaps a ROS 2 bag), not MAVLink: {_RECORD_A_TLOG}",
     Kind.MCAP: f"is an MCAP recording (ROS 2), not MAVLink: {_RECORD_A_TLOG}",
     Kind.ARCHIVE: "is a packed archive: unpack it and give the tlog inside",
-    Kind.JSON: f"is JSON, not a MAVLink recording: {_RECORD_A_TLOG}",
+    Kind.JSON: "is JSON, but neither a recording nor a plan of QGroundControl, which begins with its "
+    f"fileType: {_RECORD_A_TLOG}, or save the mission as a plan",
     Kind.TEXT: f"is text, not a MAVLink recording: {_RECORD_A_TLOG}",
     Kind.EMPTY: "is empty: nothing was recorded; give a tlog that holds frames",
     Kind.UNKNOWN: "holds no MAVLink that can be recognised: "
@@ -100,10 +107,17 @@ _MAGICS: tuple[tuple[bytes, Kind], ...] = (
 )
 
 _TEXTS: tuple[tuple[re.Pattern[bytes], Kind], ...] = (
-    (re.compile(rb"QGC WPL \d+"), Kind.WPL),
+    (re.compile(rb"QGC[ \t]+WPL[ \t]+\S"), Kind.WPL),
     (re.compile(rb"FMT, ?\d+"), Kind.DATAFLASH_TEXT),
     (re.compile(rb'\{[^\0]*?"fileType"\s*:\s*"(Plan|Mission|GeoFence|RallyPoints)"'), Kind.PLAN),
     (re.compile(rb"[{\[]\s*[\"{\[\]}\d-]"), Kind.JSON),
+    (re.compile(rb"(?:#[^\n]*\n\s*)*RALLY[ \t]+[-\d.]"), Kind.RALLY),
+    (
+        re.compile(
+            rb"(?:#[^\n]*\n\s*)*(?:-?\d{1,3}\.\d{3,}[ \t]+-?\d{1,3}\.\d{3,}[ \t]*\r?(?:\n|\Z)\s*){3}"
+        ),
+        Kind.POINTS,
+    ),
 )
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _TEXT_BYTES = bytes({*range(0x20, 0x7F), *range(0x80, 0xF5), *b"\t\n\r\f"})  # of UTF-8

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from mavframecheck.wire.chunk import Chunk
 from mavframecheck.wire.dialect import Dialect
 from mavframecheck.wire.frames import STX_V1, STX_V2, Bools, Frames, join
 from mavframecheck.wire.framing import Framer, Scan
-from mavframecheck.wire.table import Tables
+from mavframecheck.wire.table import Table, Tables
 
 MANY_MAGIC = 300_000
 SHORT = 1 << 18
@@ -23,32 +23,44 @@ class Batch:
     """Some frames of a recording, the tables they decode to, and the damage found on the way."""
 
     def __init__(
-        self, scans: list[Scan], dialect: Dialect, first: int = 0, clock_us: int = 0
+        self,
+        frames: Frames,
+        dialect: Dialect,
+        buffer: bytes = b"",
+        tables: Mapping[str, Table] | None = None,
     ) -> None:
-        """Put the `scans` of all flows in order; `first` and `clock_us` go on from the batch before."""
-        self.damage: list[Damage] = sorted(
-            (d for s in scans for d in s.damage), key=lambda d: d.offset
-        )
-        self.buffer, self.frames = _merge(scans)
-        frames = self.frames
-        frames.number = np.arange(first, first + len(frames))
-        frames.clock_us = np.maximum.accumulate(
-            np.maximum(np.where(frames.t_valid, frames.t_us, 0), clock_us)
-        )
+        """Hold `frames`, whose payloads lie in `buffer`, or whose `tables` never were bytes."""
+        self.frames = frames
+        self.damage: list[Damage] = []
+        self.buffer = buffer
         self.layouts = dialect.layouts
+        if tables is not None:
+            self.tables = tables
 
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self.frames)
 
     @functools.cached_property
-    def tables(self) -> Tables:
+    def tables(self) -> Mapping[str, Table]:
         """The good frames, by message."""
         return Tables(np.frombuffer(self.buffer, np.uint8), self.frames, self.layouts)
 
     def restrict(self, rows: Bools) -> None:
         """Let `tables` hold only the frames at `rows`, (n,)."""
         self.tables = Tables(np.frombuffer(self.buffer, np.uint8), self.frames, self.layouts, rows)
+
+
+def _of_scans(scans: list[Scan], dialect: Dialect, first: int = 0, clock_us: int = 0) -> Batch:
+    """Put the `scans` of all flows in order; `first` and `clock_us` go on from the batch before."""
+    buffer, frames = _merge(scans)
+    frames.number = np.arange(first, first + len(frames))
+    frames.clock_us = np.maximum.accumulate(
+        np.maximum(np.where(frames.t_valid, frames.t_us, 0), clock_us)
+    )
+    batch = Batch(frames, dialect, buffer)
+    batch.damage = sorted((d for s in scans for d in s.damage), key=lambda d: d.offset)
+    return batch
 
 
 def _merge(scans: list[Scan]) -> tuple[bytes, Frames]:
@@ -98,10 +110,10 @@ def read_batches(
         for chunk in group:
             framer = framers.setdefault(chunk.flow, Framer(dialect, stamped=stamped))
             scans.append(framer.feed(chunk))
-        batch = Batch(scans, dialect, first, clock_us)
+        batch = _of_scans(scans, dialect, first, clock_us)
         first += len(batch)
         clock_us = int(batch.frames.clock_us[-1]) if len(batch) else clock_us
         yield batch
     if framers:
         scans = [framer.feed(None) for framer in framers.values()]
-        yield Batch(scans, dialect, first, clock_us)
+        yield _of_scans(scans, dialect, first, clock_us)

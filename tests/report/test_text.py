@@ -123,7 +123,7 @@ def test_several_files_are_summed_up() -> None:
 def test_mission_item_has_a_line_and_no_time() -> None:
     """A mission is pointed at by line and item."""
     text = shown(Checked(made_up.file(), (made_up.mission_item(),)))
-    assert "\n    once, line 5, item 3, MAV_CMD_NAV_WAYPOINT\n" in text
+    assert "\n    once, line 5, column 71, item 3, MAV_CMD_NAV_WAYPOINT\n" in text
 
 
 def test_many_senders_are_cut_short() -> None:
