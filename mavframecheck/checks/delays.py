@@ -29,6 +29,7 @@ _FASTEST_MPS = 30.0
 """Faster (m/s) is a leap of the origin, not a flight."""
 _EARLIEST_S, _LATEST_S, _FINE_S = -0.6, 1.5, 0.02
 """Delays that are tried, s."""
+_SHORT_S = 0.2
 _TORN_S = 1.0
 
 
@@ -41,6 +42,8 @@ class Fit(NamedTuple):
     """Correlation without delay."""
     spread_mps: float
     """Standard deviation of the speed, m/s."""
+    inert: float
+    """Correlation of the reference with itself `_SHORT_S` earlier: near 1 a delay does not show."""
 
 
 @dataclass(slots=True)
@@ -92,7 +95,8 @@ def fit_delay(track: tuple[Floats, Floats], reference: tuple[Floats, Floats]) ->
     matches = [_correlation(speed, np.interp(t - delay, at, known)) for delay in delays]
     best, none = int(np.argmax(matches)), int(np.argmin(np.abs(delays)))
     spread = float(np.std(np.interp(t, at, known)))
-    return Fit(float(delays[best]), matches[best], matches[none], spread)
+    inert = _correlation(np.interp(t, at, known), np.interp(t - _SHORT_S, at, known))
+    return Fit(float(delays[best]), matches[best], matches[none], spread, inert)
 
 
 def _correlation(a: Floats, b: Floats) -> float:
@@ -181,14 +185,18 @@ class StreamDelay(ClockCheck):
         streams = [
             timing
             for timing in self.clocks.timings
-            if timing.stream.key.message in self._fields and not self.autopilot(timing.sender)
+            if timing.stream.key.message in self._fields
+            and not self.autopilot(timing.sender)
+            and self.concerns_sender(timing.sender)
         ]
         if not streams:
             return Verdict(0)
-        judged = self.judged()
+        judged = [timing for timing in self.judged() if self.concerns_sender(timing.sender)]
         if not judged:
             return Verdict(0, "the estimates are not stamped by the vehicle's clock")
         fits = [fit for timing in judged if (fit := self._fit(timing)) is not None]
         if all(fit.spread_mps < self.params["min_spread_mps"] for fit in fits):
             return Verdict(0, "the vehicle hardly moved, or its position is not in the recording")
+        if all(1 - fit.inert < self.params["min_gain"] for fit in fits):
+            return Verdict(0, "the vehicle's speed changes too slowly to show a delay")
         return Verdict(sum(timing.stream.stamped for timing in judged))

@@ -34,7 +34,8 @@ def check_recording(
 ) -> tuple[FileReport, tuple[Finding, ...]]:
     """Judge an open recording."""
     reading = Reading(recording, settings, dialect)
-    runner = Runner(recording.name, chosen_rules(pack, settings), reading.context, dialect)
+    rules = chosen_rules(pack, settings)
+    runner = Runner(recording.name, rules, reading.context, dialect, settings.sender)
     for batch in reading.batches(progress):
         runner.update(batch)
     findings, runs = runner.finish()
