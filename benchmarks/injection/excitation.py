@@ -63,9 +63,9 @@ def excitation(log: Log, stream: Table) -> Excitation:
     """Return what the vehicle does while `stream` is heard."""
     heard = log.seconds[stream.frames.number[[0, -1]]]
     at = np.arange(heard[0] + 2, heard[1] - 2, GRID_S)
-    place = _place(log, at)
+    place = _place(log, at) if len(at) >= 50 else None
     angles = _columns(log, ("roll", "pitch", "yaw"), at)
-    if place is None or angles is None or len(at) < 50:
+    if place is None or angles is None:
         return Excitation(*[False] * len(Excitation._fields))._replace(varies=np.inf)
     level, up, track = _displacements(place)
     speed = np.linalg.norm(place[10:] - place[:-10], axis=1)

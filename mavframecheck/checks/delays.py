@@ -198,5 +198,5 @@ class StreamDelay(ClockCheck):
         if all(fit.spread_mps < self.params["min_spread_mps"] for fit in fits):
             return Verdict(0, "the vehicle hardly moved, or its position is not in the recording")
         if all(1 - fit.inert < self.params["min_gain"] for fit in fits):
-            return Verdict(0, "the vehicle's speed changes too slowly to show a delay")
+            return Verdict(0, f"the vehicle's speed changes too slowly to show a delay of {_SHORT_S} s")
         return Verdict(sum(timing.stream.stamped for timing in judged))

@@ -39,6 +39,12 @@ class Reading(NamedTuple):
     of: Callable[[Floats], Floats]
     """From (n, 4) `ned_from_frd` to what the stream would hold."""
     free_yaw: bool = False
+    back: Callable[[Floats], Floats] | None = None
+    """What undoes `of`, where doing it again does not."""
+
+    def undo(self, q: Floats) -> Floats:
+        """Return (n, 4) `ned_from_frd` from what the stream holds."""
+        return self.of(q) if self.back is None else self.back(q)
 
 
 def _euler(
@@ -69,7 +75,12 @@ READINGS = (
         _euler(lambda r, p, y: (r, p, -y)),
         free_yaw=True,
     ),
-    Reading("order", "its elements are x, y, z, w", lambda q: q[:, [1, 2, 3, 0]]),
+    Reading(
+        "order",
+        "its elements are x, y, z, w",
+        lambda q: q[:, [1, 2, 3, 0]],
+        back=lambda q: q[:, [3, 0, 1, 2]],
+    ),
     Reading("inverse", "it is the inverse (from the world to the body)", q4.inverse),
     Reading("swapped", "roll and pitch have changed places", _euler(lambda r, p, y: (p, r, y))),
     Reading("body", "pitch has the wrong sign", _euler(lambda r, p, y: (r, -p, y))),
@@ -165,10 +176,10 @@ def _read(reading: Reading, mine: Floats, theirs: Floats, *, free_heading: bool)
     predicted = reading.of(theirs)
     yaw = 0.0
     if free_heading or reading.free_yaw:
-        turns = q4.twist(q4.product(mine, q4.inverse(predicted)))
+        turns = q4.twist(q4.product(reading.undo(mine), q4.inverse(theirs)))
         yaw = float(np.angle(np.exp(1j * turns).sum()))
         yaw += float(np.median(np.angle(np.exp(1j * (turns - yaw)))))
-        predicted = q4.product(q4.about_z(yaw), predicted)
+        predicted = reading.of(q4.product(q4.about_z(yaw), theirs))
     heading = np.exp(1j * q4.euler_from_quaternion(theirs)[:, 2])
     spread = np.abs(np.angle(heading / (heading.mean() or 1.0)))
     turned = float(np.percentile(spread, 85)) * 2  # more than the mean leaves out
