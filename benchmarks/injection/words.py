@@ -86,6 +86,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "share": np.mean,
     "geoid": undulation,
     "len": len,
+    "every": np.all,
     "median": np.median,
     "inverse": quaternions.inverse,
     "times": quaternions.product,
