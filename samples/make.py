@@ -24,7 +24,7 @@ FAULTY_S = (20.0, 23.0)
 """When the fault of a sample shows, s from its start, where it does not show throughout."""
 ALWAYS = (0.0, math.inf)
 FROZEN_S = (24.0, 36.0)
-MOVING = 3
+MOVING = 2
 """Sides of the square that show which way axes point."""
 GLOBAL_SETPOINT = "SET_POSITION_TARGET_GLOBAL_INT"
 MESSAGES = {message.msgname: message for message in dialect.mavlink_map.values()}
