@@ -129,7 +129,9 @@ def stretched_quaternion(fields: Fields) -> Fields:
     return {"q": [0.9 * part for part in fields["q"]]}
 
 
-def moving(message: str, change: Change, during: tuple[float, float] = ALWAYS) -> Callable[[], bytes]:
+def moving(
+    message: str, change: Change, during: tuple[float, float] = ALWAYS
+) -> Callable[[], bytes]:
     """Return a maker of a longer flight in which an estimate of the pose is wrong."""
     known = Flight(sides=MOVING, odometry=message == "ODOMETRY", vision=message == VISION)
     return lambda: tlog(pack(changed(known.traffic(), message, change, during)))

@@ -58,7 +58,9 @@ def picture(path: Path) -> str:
         left = 16 + place * (SIDE + GAP + 22)
         shifted = track + (true - track)[0]
         body += [_text(left, TOP - 12, title, colour)]
-        body += _panel(left, TOP, SIDE, (true[:, 1], true[:, 0]), (shifted[:, 1], shifted[:, 0]), colour)
+        body += _panel(
+            left, TOP, SIDE, (true[:, 1], true[:, 0]), (shifted[:, 1], shifted[:, 0]), colour
+        )
         body += [_text(left + 6, TOP + 18, "from above: north up, east right", GREY)]
         low = TOP + SIDE + 22
         body += _panel(left, low, LOW, (at, -true[:, 2]), (at, -shifted[:, 2]), colour)

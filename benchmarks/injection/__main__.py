@@ -33,7 +33,10 @@ def options() -> argparse.Namespace:
     """Return the command line."""
     parser = arguments(__doc__ or "")
     parser.add_argument(
-        "--only", nargs="*", default=[], help="codes, or beginnings of codes; motion: the second part"
+        "--only",
+        nargs="*",
+        default=[],
+        help="codes, or beginnings of codes; motion: the second part",
     )
     parser.add_argument("--tuning", action="store_true", help="motion: the recordings for tuning")
     parser.add_argument("--full", action="store_true", help="motion: every case (an hour and more)")

@@ -25,6 +25,7 @@ MOVING_S = 10.0
 ALONG_M = 0.3
 """Root mean square of the displacements along a direction that can be judged."""
 TRACK_M = 25.0
+LEAST_FIXES = 30
 TURN = np.radians(40.0)
 TILT = np.radians(4.0)
 TILTED_S = 4.0
@@ -38,7 +39,8 @@ class Excitation(NamedTuple):
     """Which motions there are enough of."""
 
     across: bool
-    """Along two level directions: 10 s of displacements of 0.3 m and more, 0.3 m along either."""
+    """Along two level directions: 10 s of displacements of 0.3 m and more, 0.3 m along either, and more than
+    what the GNSS fix adds to them."""
     climb: bool
     """The same along the vertical."""
     far: bool
@@ -68,14 +70,16 @@ def excitation(log: Log, stream: Table) -> Excitation:
     if place is None or angles is None:
         return Excitation(*[False] * len(Excitation._fields))._replace(varies=np.inf)
     level, up, track = _displacements(place)
+    witnessed, heights = _witness(log)
+    level = level if level >= _noise(log, place, at) else 0.0
     speed = np.linalg.norm(place[10:] - place[:-10], axis=1)
     roll, pitch, yaw = angles.T
     spread = np.abs(np.angle(np.exp(1j * yaw) / np.exp(1j * yaw).mean()))
     tilted = min(_seconds(np.abs(each) > TILT) for each in (roll, pitch, roll - pitch))
     return Excitation(
-        across=level >= ALONG_M,
-        climb=up >= ALONG_M,
-        far=track >= TRACK_M,
+        across=witnessed and level >= ALONG_M,
+        climb=heights and up >= ALONG_M,
+        far=witnessed and track >= TRACK_M,
         varies=_varies(speed),
         turn=bool(2 * np.percentile(spread, 95) >= TURN),
         tilt=tilted >= TILTED_S,
@@ -108,6 +112,13 @@ def _varies(speed: Floats) -> float:
     return float("inf")
 
 
+def _witness(log: Log) -> tuple[bool, bool]:
+    """Return whether something independent tells where the vehicle is, and how high."""
+    gnss, truth = log.own("GPS_RAW_INT"), log.own("SIMSTATE")
+    fixed = gnss is not None and np.count_nonzero(gnss["fix_type"] >= 3) >= LEAST_FIXES
+    return bool(fixed or (truth is not None and len(truth) >= LEAST_FIXES)), bool(fixed)
+
+
 def _slides(place: Floats, yaw: Floats) -> bool:
     v = (place[10:] - place[:-10]) / (10 * GRID_S)
     v, yaw = v[(moves := np.linalg.norm(v, axis=1) > SLOW_MPS)], yaw[5:-5][moves]
@@ -117,14 +128,32 @@ def _slides(place: Floats, yaw: Floats) -> bool:
     return bool(np.mean(to_the_right**2) >= SLIDING**2 * np.mean(np.square(v).sum(axis=1)))
 
 
+def _noise(log: Log, place: Floats, at: Floats) -> float:
+    """Return the root mean square by which the displacements of the GNSS fix are off, m in a second."""
+    gnss = log.own("GPS_RAW_INT")
+    if gnss is None or not np.count_nonzero(gnss["fix_type"] >= 3):
+        return 0.0
+    gnss = gnss.take(gnss["fix_type"] >= 3)
+    level = _metres(gnss["lat"] * 1e-7, gnss["lon"] * 1e-7)
+    fix = np.column_stack((level, -gnss["alt"] * 1e-3))
+    t = log.seconds[gnss.frames.number]
+    went = [np.interp(at[10:], t, each) - np.interp(at[:-10], t, each) for each in fix.T]
+    off = np.column_stack(went) - (place[10:] - place[:-10])
+    return float(np.sqrt(np.mean(np.sort(np.square(off).sum(axis=1))[: round(0.95 * len(off))])))
+
+
+def _metres(lat: Floats, lon: Floats) -> Floats:
+    """Return (n, 2) metres north and east of the first one."""
+    east = ((lon - lon[0] + 180) % 360 - 180) * np.cos(np.radians(lat))
+    return np.column_stack(((lat - lat[0]) * _METRES, east * _METRES))
+
+
 def _place(log: Log, at: Floats) -> Floats | None:
     """Return (n, 3) metres north, east and down from somewhere."""
     place = _columns(log, ("lat", "lon", "alt"), at)
     if place is None:
         return None
-    lat, lon, alt = place.T
-    east = ((lon - lon[0] + 180) % 360 - 180) * np.cos(np.radians(lat))
-    return np.column_stack(((lat - lat[0]) * _METRES, east * _METRES, -alt))
+    return np.column_stack((_metres(place[:, 0], place[:, 1]), -place[:, 2]))
 
 
 def _columns(log: Log, names: tuple[str, ...], at: Floats) -> Floats | None:
@@ -136,7 +165,9 @@ def _columns(log: Log, names: tuple[str, ...], at: Floats) -> Floats | None:
     place = table.take(table["lat"] != 0) if "lat" in names else table
     t = log.seconds[place.frames.number]
     near = np.clip(np.searchsorted(t, at), 0, len(t) - 1)
-    return np.column_stack([place[FACTS["vehicle"][n][1]][near] * FACTS["vehicle"][n][2] for n in names])
+    return np.column_stack(
+        [place[FACTS["vehicle"][n][1]][near] * FACTS["vehicle"][n][2] for n in names]
+    )
 
 
 def _seconds(holds: npt.NDArray[np.bool_]) -> float:

@@ -6,14 +6,14 @@ import hashlib
 import itertools
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from benchmarks.injection.excitation import Excitation, excitation
@@ -59,7 +59,7 @@ class Case(NamedTuple):
     value: float
     codes: tuple[str, ...]
     says: str
-    held: dict[str, str] = {}
+    held: Mapping[str, str] = MappingProxyType({})
     """Field -> what it holds, where axes are permuted."""
 
     @property
@@ -144,7 +144,9 @@ def _permutations(distortion: Distortion, fields: tuple[str, str, str]) -> Itera
                 yield Case(distortion, dict(zip(fields, values)), 0.0, (codes,), says, held)
 
 
-def _answer(matrix: np.typing.NDArray[np.float64], fields: tuple[str, str, str], *, free: bool) -> tuple[str, str]:
+def _answer(
+    matrix: np.typing.NDArray[np.float64], fields: tuple[str, str, str], *, free: bool
+) -> tuple[str, str]:
     """Return the code and the words for axes `matrix`, stream from NED; none where they are right."""
     z_up = matrix[2, 2] < 0
     proper = np.linalg.det(matrix) > 0
@@ -165,11 +167,15 @@ def _answer(matrix: np.typing.NDArray[np.float64], fields: tuple[str, str, str],
     return "MFC401", _held(matrix, fields, (0, 1, 2))
 
 
-def _held(matrix: np.typing.NDArray[np.float64], fields: tuple[str, str, str], axes: tuple[int, ...]) -> str:
+def _held(
+    matrix: np.typing.NDArray[np.float64], fields: tuple[str, str, str], axes: tuple[int, ...]
+) -> str:
     words = []
     for axis in axes:
         column = int(np.flatnonzero(matrix[axis])[0])
-        words.append(f"{fields[axis]} (is|holds) (?i:{_HELD[column][int(matrix[axis, column] < 0)]})")
+        words.append(
+            f"{fields[axis]} (is|holds) (?i:{_HELD[column][int(matrix[axis, column] < 0)]})"
+        )
     return ", ".join(words)
 
 
@@ -187,9 +193,7 @@ def _judged(data: bytes, sender: int | None) -> tuple[FileReport, list[Finding]]
     return report, list(findings)
 
 
-def judge_recording(
-    folder: Path, name: str, *, full: bool = False
-) -> Motions:
+def judge_recording(folder: Path, name: str, *, full: bool = False) -> Motions:
     """Write distortions into a recording, whole and in pieces, and judge it; all of them where `full`."""
     plan = read_plan().motion
     found = Motions()
@@ -199,7 +203,7 @@ def judge_recording(
     for piece in PIECES:
         part = _piece(log, piece)
         if part is not None:
-            one_of = {} if full else plan.one_of
+            one_of = {} if full else {str(kind): some for kind, some in plan.one_of.items()}
             found.add(_judge_piece(part, name, piece, list(plan.distortion), one_of))
     return found
 
@@ -231,7 +235,12 @@ def _piece(log: Log, piece: str) -> Log | None:
     if not len(globe):
         return None
     north = (globe["lat"] - globe["lat"][0]) * 1e-7 * _METRES
-    east = (globe["lon"] - globe["lon"][0]) * 1e-7 * np.cos(np.radians(globe["lat"][0] * 1e-7)) * _METRES
+    east = (
+        (globe["lon"] - globe["lon"][0])
+        * 1e-7
+        * np.cos(np.radians(globe["lat"][0] * 1e-7))
+        * _METRES
+    )
     away = np.hypot(north, east)
     if piece == "ground":
         away = np.maximum(away, np.abs(globe["relative_alt"] - globe["relative_alt"][0]) * 1e-3)
@@ -254,7 +263,7 @@ def _streams(log: Log, message: str) -> list[Table]:
 
 
 def _judge_piece(
-    log: Log, name: str, piece: str, distortions: list[Distortion], one_of: dict[str, int]
+    log: Log, name: str, piece: str, distortions: list[Distortion], one_of: Mapping[str, int]
 ) -> Motions:
     where = f"{name} ({piece})"
     _, before = _judged(log.written({}), None)
@@ -329,7 +338,9 @@ def _word(
 
 def _agrees(finding: Finding, case: Case) -> bool:
     """Return whether what a finding says of the fields is what they hold."""
-    said = re.findall(r"\b(\w+) (?:is|holds) (north|south|east|west|up|down)\b", finding.text, re.IGNORECASE)
+    said = re.findall(
+        r"\b(\w+) (?:is|holds) (north|south|east|west|up|down)\b", finding.text, re.IGNORECASE
+    )
     if not case.held or case.distortion.free_heading:
         return True
     return all(case.held.get(name, held).lower() == held.lower() for name, held in said)

@@ -38,7 +38,8 @@ def _show(name: str, outcomes: list[Outcome], *, everything: bool, cases: bool =
         print(f"    {outcome.word}: {outcome.case}, {outcome.where}")
         if outcome.text:
             print(f"        {outcome.text}")
-    return (share or 1.0) >= REQUIRED_RECALL and not words["passed"] and not words["alarm"]
+    good = share is None or share >= REQUIRED_RECALL
+    return good and not words["passed"] and not words["alarm"]
 
 
 def recall(words: Counter[str]) -> float | None:

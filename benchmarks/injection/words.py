@@ -79,7 +79,10 @@ def turned(q: Any, v: Any) -> Floats:
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in ("where", "abs", "sin", "cos", "radians", "degrees")},
-    **{name: getattr(np, name) for name in ("hypot", "arctan2", "float32", "isnan", "isfinite", "minimum")},
+    **{
+        name: getattr(np, name)
+        for name in ("hypot", "arctan2", "float32", "isnan", "isfinite", "minimum")
+    },
     **{name: getattr(np, name) for name in ("maximum", "isin", "trunc", "zeros_like", "full")},
     "sqrt": np.sqrt,
     "distinct": distinct,
@@ -160,9 +163,8 @@ class Scope(dict[str, Any]):
     def _earlier(self, values: Any, seconds: float) -> Any:
         """Return what a column, or columns, held `seconds` before, at the beginning the first value."""
         t = self._log.seconds[self._table.frames.number]
-        if np.ndim(values) == 1:
-            return np.interp(t - seconds, t, values)
-        return values[np.maximum(np.searchsorted(t, t - seconds, side="right") - 1, 0)]
+        rows = round(seconds / max(float(np.median(np.diff(t))), 1e-3)) if len(t) > 1 else 0
+        return values[np.maximum(np.arange(len(t)) - rows, 0)]
 
     def _noise(self, size: float) -> Floats:
         """Return (n,) random numbers of that standard deviation."""

@@ -30,6 +30,8 @@ _FASTEST_MPS = 30.0
 _EARLIEST_S, _LATEST_S, _FINE_S = -0.6, 1.5, 0.02
 """Delays that are tried, s."""
 _SHORT_S = 0.2
+_FOLLOWS = 0.985
+"""Correlation from which on it can be said that there is no delay."""
 _TORN_S = 1.0
 
 
@@ -197,6 +199,11 @@ class StreamDelay(ClockCheck):
         fits = [fit for timing in judged if (fit := self._fit(timing)) is not None]
         if all(fit.spread_mps < self.params["min_spread_mps"] for fit in fits):
             return Verdict(0, "the vehicle hardly moved, or its position is not in the recording")
-        if all(1 - fit.inert < self.params["min_gain"] for fit in fits):
-            return Verdict(0, f"the vehicle's speed changes too slowly to show a delay of {_SHORT_S} s")
+        alike_enough = [fit for fit in fits if fit.correlation >= _FOLLOWS or self._late(fit)]
+        if not alike_enough:
+            return Verdict(0, "its speed does not follow the vehicle's closely")
+        if all(1 - fit.inert < self.params["min_gain"] for fit in alike_enough):
+            return Verdict(
+                0, f"the vehicle's speed changes too slowly to show a delay of {_SHORT_S} s"
+            )
         return Verdict(sum(timing.stream.stamped for timing in judged))

@@ -12,7 +12,7 @@ from mavframecheck.cli.clocks import ClockTable
 from mavframecheck.cli.options import dialect_option, input_kind_option
 from mavframecheck.cli.output import echo, page_context
 from mavframecheck.cli.positions import FORMATS, Positions, Wish, position_options
-from mavframecheck.cli.sender import Integration, SenderType
+from mavframecheck.cli.sender import Integration, parse_sender
 from mavframecheck.report import Context
 from mavframecheck.report.escape import sentence
 
@@ -59,7 +59,8 @@ _PIPE_WIDTH = 100
 )
 @click.option(
     "--sender",
-    type=SenderType(),
+    metavar="SYS/COMP",
+    callback=parse_sender,
     help="Say how this sender of poses or positions does in each step of integrating a sensor.",
 )
 @position_options

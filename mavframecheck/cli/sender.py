@@ -9,23 +9,23 @@ import click
 
 from mavframecheck.cli.output import echo
 from mavframecheck.report import Context
+from mavframecheck.report.escape import sentence
 
 if TYPE_CHECKING:
     from mavframecheck.engine import Settings
     from mavframecheck.model.integration import FileIntegration
 
 
-class SenderType(click.ParamType):
-    """``SYS/COMP``: a system and a component, 0 to 255 each."""
-
-    name = "SYS/COMP"
-
-    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Return ``sysid * 256 + compid``."""
-        parts = value.split("/")
-        if len(parts) != 2 or not all(p.isascii() and p.isdigit() and int(p) < 256 for p in parts):
-            self.fail(f"'{value}' is no sender: write SYS/COMP, as in 1/191.", param, ctx)
-        return int(parts[0]) << 8 | int(parts[1])
+def parse_sender(_ctx: click.Context, _param: click.Parameter, value: str | None) -> int | None:
+    """Return ``sysid * 256 + compid`` of ``SYS/COMP``: a system and a component, 0 to 255 each."""
+    if value is None:
+        return None
+    parts = value.split("/")
+    if len(parts) != 2 or not all(p.isascii() and p.isdigit() and int(p) < 256 for p in parts):
+        raise click.BadParameter(
+            f"{sentence(value)} is no sender: write SYS/COMP, as in 1/191.", param_hint="--sender"
+        )
+    return int(parts[0]) << 8 | int(parts[1])
 
 
 class Integration:

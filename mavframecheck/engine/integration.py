@@ -66,7 +66,9 @@ def step_result(step: Step, report: FileReport, findings: Sequence[Finding]) -> 
     """Return how a step ended: failed by a finding, passed only where every rule of it could tell."""
     found = tuple(each for each in findings if each.code in step.codes)
     runs = tuple(run for run in report.runs if run.code in step.codes)
-    missing = tuple(dict.fromkeys(r.reason for r in runs if r.reason and r.status != "not-applicable"))
+    missing = tuple(
+        dict.fromkeys(r.reason for r in runs if r.reason and r.status != "not-applicable")
+    )
     verdict: Verdict = "passed"
     if found:
         verdict = "failed"

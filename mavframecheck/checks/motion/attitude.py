@@ -210,7 +210,7 @@ def _choose(reads: list[_Read], delay_s: float, times: tuple[float, float]) -> L
 def _shows(read: _Read, labelled: _Read) -> bool:
     """Return whether a reading, were it the right one, would differ from the label for long enough."""
     if read.reading.kind in NEED_TURN:
-        return read.turned >= MIN_TURN
+        return bool(read.turned >= MIN_TURN)
     apart = q4.angle_between(read.reading.of(labelled.predicted), labelled.predicted)
     enough = np.count_nonzero(apart > TELLING) >= MIN_TELLING
     return bool(enough and _usual(apart) > TELLING / 5)

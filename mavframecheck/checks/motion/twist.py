@@ -107,16 +107,20 @@ def _choose(
     told = frozenset(
         name for name in readings if _differ(readings[name], readings[label], FITS * speed)
     )
+    if left[best] > FITS * speed:
+        return "the velocity follows the vehicle in no axes"
     if best in (label, "level") or fine:
         return Twist("labelled", "", left[label], left[label], len(true) * GRID_S, times, told)
     differ = np.linalg.norm(readings[best] - readings[label], axis=1) > MIN_MPS
     if np.count_nonzero(differ) < MIN_TELLING:
         return "the vehicle points along the axes of the world"
-    if left[best] > FITS * speed or left[best] > CLEARLY * left[label]:
+    if left[best] > CLEARLY * left[label]:
         return "the velocity follows the vehicle in no axes"
     return Twist(best, _SAYS[best], left[best], left[label], len(true) * GRID_S, times, told)
 
 
 def _differ(reading: Floats, label: Floats, least: float) -> bool:
     apart = np.linalg.norm(reading - label, axis=1)
-    return bool(np.count_nonzero(apart > MIN_MPS) >= MIN_TELLING and trimmed_rms(apart, 0.95) > least)
+    return bool(
+        np.count_nonzero(apart > MIN_MPS) >= MIN_TELLING and trimmed_rms(apart, 0.95) > least
+    )
