@@ -134,7 +134,7 @@ def _noise(log: Log, place: Floats, at: Floats) -> float:
     if gnss is None or not np.count_nonzero(gnss["fix_type"] >= 3):
         return 0.0
     gnss = gnss.take(gnss["fix_type"] >= 3)
-    level = _metres(gnss["lat"] * 1e-7, gnss["lon"] * 1e-7)
+    level = metres(gnss["lat"] * 1e-7, gnss["lon"] * 1e-7)
     fix = np.column_stack((level, -gnss["alt"] * 1e-3))
     t = log.seconds[gnss.frames.number]
     went = [np.interp(at[10:], t, each) - np.interp(at[:-10], t, each) for each in fix.T]
@@ -142,7 +142,7 @@ def _noise(log: Log, place: Floats, at: Floats) -> float:
     return float(np.sqrt(np.mean(np.sort(np.square(off).sum(axis=1))[: round(0.95 * len(off))])))
 
 
-def _metres(lat: Floats, lon: Floats) -> Floats:
+def metres(lat: Floats, lon: Floats) -> Floats:
     """Return (n, 2) metres north and east of the first one."""
     east = ((lon - lon[0] + 180) % 360 - 180) * np.cos(np.radians(lat))
     return np.column_stack(((lat - lat[0]) * _METRES, east * _METRES))
@@ -153,7 +153,7 @@ def _place(log: Log, at: Floats) -> Floats | None:
     place = _columns(log, ("lat", "lon", "alt"), at)
     if place is None:
         return None
-    return np.column_stack((_metres(place[:, 0], place[:, 1]), -place[:, 2]))
+    return np.column_stack((metres(place[:, 0], place[:, 1]), -place[:, 2]))
 
 
 def _columns(log: Log, names: tuple[str, ...], at: Floats) -> Floats | None:

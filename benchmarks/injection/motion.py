@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -11,12 +10,12 @@ from dataclasses import dataclass, field
 from functools import cache
 from io import BytesIO
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.injection.excitation import Excitation, excitation
+from benchmarks.injection.distortions import Case, cases
+from benchmarks.injection.excitation import Excitation, excitation, metres
 from benchmarks.injection.log import AUTOPILOT, Change, Log, put
 from benchmarks.injection.make import records_of
 from benchmarks.injection.places import Place, moved
@@ -43,31 +42,10 @@ EXTERNAL = (
     "GPS_INPUT",
 )
 LEAST_ROWS = 30
-_HELD = (("North", "South"), ("East", "West"), ("down", "up"))
-_METRES = 111_200.0
 
 
 PARTS = ("MFC401", "MFC402", "MFC403", "MFC507")
 """Codes that say a part of where axes point: right where motion shows no more."""
-
-
-class Case(NamedTuple):
-    """A distortion with one value, of one stream."""
-
-    distortion: Distortion
-    set: dict[str, str]
-    value: float
-    codes: tuple[str, ...]
-    says: str
-    held: Mapping[str, str] = MappingProxyType({})
-    """Field -> what it holds, where axes are permuted."""
-
-    @property
-    def name(self) -> str:
-        """What is done, with the value."""
-        if self.distortion.permute:
-            return f"{self.distortion.name}: {', '.join(self.set.values())}"
-        return self.distortion.name + (f" {self.value:g}" if self.distortion.values else "")
 
 
 class Outcome(NamedTuple):
@@ -76,7 +54,6 @@ class Outcome(NamedTuple):
     distortion: str
     case: str
     where: str
-    reported: bool
     word: str
     """See `WORDS`."""
     text: str = ""
@@ -121,64 +98,6 @@ def recordings(folder: Path, beginnings: tuple[str, ...]) -> list[str]:
     return [name for name in names if name.startswith(beginnings)]
 
 
-def cases(distortion: Distortion) -> Iterator[Case]:
-    """Yield the cases of a distortion."""
-    if distortion.permute is not None:
-        yield from _permutations(distortion, distortion.permute)
-        return
-    for value in distortion.values or (0.0,):
-        says = distortion.says.replace("{k}", f"{value:g}")
-        yield Case(distortion, distortion.set, value, distortion.codes, says)
-
-
-def _permutations(distortion: Distortion, fields: tuple[str, str, str]) -> Iterator[Case]:
-    """Yield every wrong order and sign of three fields, with the code and the words that it must get."""
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1, -1), repeat=3):
-            matrix = np.zeros((3, 3))
-            matrix[range(3), order] = signs
-            codes, says = _answer(matrix, fields, free=distortion.free_heading)
-            if codes:
-                values = [f"{'-' * (sign < 0)}{fields[k]}" for k, sign in zip(order, signs)]
-                held = {name: _HELD[k][sign < 0] for name, k, sign in zip(fields, order, signs)}
-                yield Case(distortion, dict(zip(fields, values)), 0.0, (codes,), says, held)
-
-
-def _answer(
-    matrix: np.typing.NDArray[np.float64], fields: tuple[str, str, str], *, free: bool
-) -> tuple[str, str]:
-    """Return the code and the words for axes `matrix`, stream from NED; none where they are right."""
-    z_up = matrix[2, 2] < 0
-    proper = np.linalg.det(matrix) > 0
-    if not matrix[2, 2]:
-        return "MFC401", _held(matrix, fields, (2,) if free else (0, 1, 2))
-    only_z = z_up and not proper and (free or matrix[0, 0] > 0 < matrix[1, 1])
-    if only_z:
-        return "MFC402", f"{fields[2]} grows when the vehicle climbs"
-    if free:
-        if proper and not z_up:
-            return "", ""
-        return "MFC401", f"to the left of {fields[0]}, {_held(matrix, fields, (2,))}"
-    if proper and not z_up:
-        points = round(np.degrees(np.arctan2(matrix[0, 1], matrix[0, 0])))
-        side = {90: "clockwise", -90: "counter-clockwise"}.get(points, "(counter-)?clockwise")
-        about = "(8[5-9]|9[0-5])" if abs(points) == 90 else "1(7[5-9]|80)"
-        return ("MFC403", f"by {about} degrees {side}") if points else ("", "")
-    return "MFC401", _held(matrix, fields, (0, 1, 2))
-
-
-def _held(
-    matrix: np.typing.NDArray[np.float64], fields: tuple[str, str, str], axes: tuple[int, ...]
-) -> str:
-    words = []
-    for axis in axes:
-        column = int(np.flatnonzero(matrix[axis])[0])
-        words.append(
-            f"{fields[axis]} (is|holds) (?i:{_HELD[column][int(matrix[axis, column] < 0)]})"
-        )
-    return ", ".join(words)
-
-
 @cache
 def _pack() -> Pack:
     rules = [read_rule(file) for file in rule_files(source_folder()) if file.name.startswith(RULES)]
@@ -193,6 +112,21 @@ def _judged(data: bytes, sender: int | None) -> tuple[FileReport, list[Finding]]
     return report, list(findings)
 
 
+class _Piece(NamedTuple):
+    """A recording or a part of it, and what is found in it undistorted."""
+
+    log: Log
+    recording: str
+    name: str
+    """One of `PIECES`."""
+    before: list[Finding]
+
+    @property
+    def where(self) -> str:
+        """What is printed."""
+        return f"{self.recording} ({self.name})"
+
+
 def judge_recording(folder: Path, name: str, *, full: bool = False) -> Motions:
     """Write distortions into a recording, whole and in pieces, and judge it; all of them where `full`."""
     plan = read_plan().motion
@@ -200,11 +134,15 @@ def judge_recording(folder: Path, name: str, *, full: bool = False) -> Motions:
     log = _prepared(folder, name, plan)
     if _on_several_systems(log):
         return found
-    for piece in PIECES:
-        part = _piece(log, piece)
+    one_of = {} if full else {str(kind): some for kind, some in plan.one_of.items()}
+    for name_of_piece in PIECES:
+        part = _cut(log, name_of_piece)
         if part is not None:
-            one_of = {} if full else {str(kind): some for kind, some in plan.one_of.items()}
-            found.add(_judge_piece(part, name, piece, list(plan.distortion), one_of))
+            before = _judged(part.written({}), None)[1]
+            piece = _Piece(part, name, name_of_piece, before)
+            found.alarms += [f"{piece.where}: {_said(f)}" for f in before if f.severity != "info"]
+            found.originals += 1
+            found.outcomes += _outcomes(piece, plan.distortion, one_of)
     return found
 
 
@@ -224,7 +162,7 @@ def _prepared(folder: Path, name: str, plan: MotionPlan) -> Log:
     return log
 
 
-def _piece(log: Log, piece: str) -> Log | None:
+def _cut(log: Log, piece: str) -> Log | None:
     """Return a beginning of a recording, None where the vehicle was under way from the start."""
     if piece == "whole":
         return log
@@ -234,14 +172,7 @@ def _piece(log: Log, piece: str) -> Log | None:
     globe = globe.take(globe["lat"] != 0)
     if not len(globe):
         return None
-    north = (globe["lat"] - globe["lat"][0]) * 1e-7 * _METRES
-    east = (
-        (globe["lon"] - globe["lon"][0])
-        * 1e-7
-        * np.cos(np.radians(globe["lat"][0] * 1e-7))
-        * _METRES
-    )
-    away = np.hypot(north, east)
+    away = np.linalg.norm(metres(globe["lat"] * 1e-7, globe["lon"] * 1e-7), axis=1)
     if piece == "ground":
         away = np.maximum(away, np.abs(globe["relative_alt"] - globe["relative_alt"][0]) * 1e-3)
     left = np.flatnonzero(away > 1.5)
@@ -262,22 +193,20 @@ def _streams(log: Log, message: str) -> list[Table]:
     return [stream for stream in streams if len(stream) >= LEAST_ROWS]
 
 
-def _judge_piece(
-    log: Log, name: str, piece: str, distortions: list[Distortion], one_of: Mapping[str, int]
-) -> Motions:
-    where = f"{name} ({piece})"
-    _, before = _judged(log.written({}), None)
-    alarms = [f"{where}: {_said(f)}" for f in before if f.severity != "info"]
-    found = Motions([], alarms, 1)
+def _outcomes(
+    piece: _Piece, distortions: tuple[Distortion, ...], one_of: Mapping[str, int]
+) -> Iterator[Outcome]:
+    """Yield how the distortions of every stream fared."""
     for message in dict.fromkeys(m for d in distortions for m in d.message):
-        for stream in _streams(log, message):
-            excited = excitation(log, stream)
+        kind = "piece" if piece.name != "whole" else "own" if message in OWN else "whole"
+        for stream in _streams(piece.log, message):
+            excited = excitation(piece.log, stream)
+            scope = Scope(piece.log, stream)
             for distortion in (d for d in distortions if message in d.message):
-                if evaluate(distortion.where, Scope(log, stream), len(stream)).all():
-                    kind = "piece" if piece != "whole" else "own" if message in OWN else "whole"
-                    for case in _some(cases(distortion), where + message, one_of.get(kind, 1)):
-                        found.outcomes += _outcomes(log, stream, case, excited, before, name, where)
-    return found
+                if evaluate(distortion.where, scope, len(stream)).all():
+                    some = _some(cases(distortion), piece.where + message, one_of.get(kind, 1))
+                    for case in some:
+                        yield from _fared(piece, stream, case, excited)
 
 
 def _some(all_cases: Iterator[Case], where: str, one_of: int) -> Iterator[Case]:
@@ -287,19 +216,11 @@ def _some(all_cases: Iterator[Case], where: str, one_of: int) -> Iterator[Case]:
             yield case
 
 
-def _outcomes(
-    log: Log,
-    stream: Table,
-    case: Case,
-    excited: Excitation,
-    before: list[Finding],
-    name: str,
-    where: str,
-) -> Iterator[Outcome]:
+def _fared(piece: _Piece, stream: Table, case: Case, excited: Excitation) -> Iterator[Outcome]:
     """Yield how a case fared, and each finding that it should not have raised."""
-    known = {(f.code, f.subject) for f in before}
+    known = {(f.code, f.subject) for f in piece.before}
     sender = int(stream.frames.sender[0])
-    report, findings = _judged(_distorted(log, stream, case), sender)
+    report, findings = _judged(_distorted(piece.log, stream, case), sender)
     about = [f for f in findings if f.message_name == stream.name]
     enough = excited.has(case.distortion.needs, case.value)
     awaited = (*case.codes, *PARTS) if case.codes and not enough else case.codes
@@ -307,14 +228,11 @@ def _outcomes(
     word, text = _word(case, report, answers, excited=enough)
     expected = (*awaited, *case.distortion.also)
 
-    def outcome(word: str, text: str) -> Outcome:
-        said = f"{where} {stream.name}"
-        return Outcome(case.distortion.name, case.name, said, is_reported(name), word, text)
-
-    yield outcome(word, text)
+    outcome = Outcome(case.distortion.name, case.name, f"{piece.where} {stream.name}", word, text)
+    yield outcome
     for finding in findings:
         if finding.code not in expected and (finding.code, finding.subject) not in known:
-            yield outcome("alarm", _said(finding))
+            yield outcome._replace(word="alarm", text=_said(finding))
 
 
 def _word(

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from benchmarks.injection import motion
+from benchmarks.injection.distortions import Case, cases
 from benchmarks.injection.excitation import excitation
 from benchmarks.injection.log import Log
-from benchmarks.injection.motion import Case, Motions, Outcome, cases
+from benchmarks.injection.motion import Motions, Outcome, _Piece
 from benchmarks.injection.motion_table import show_motion
 from benchmarks.injection.plan import Distortion, read_plan
 from mavframecheck.wire import load_dialect
@@ -67,34 +68,31 @@ def test_only_the_stream_is_distorted(log: Log) -> None:
         assert after.tables[name].columns.tobytes() == log.tables[name].columns.tobytes()
 
 
-def test_a_distortion_is_found_and_a_legal_one_leaves_silence(log: Log) -> None:
-    """The words of the outcomes, on the sample."""
+def fared(log: Log, case: Case) -> list[str]:
+    """Return the words of the outcomes of a case, as if there were motion enough."""
     (mine,) = motion._streams(log, VISION)
     enough = excitation(log, mine)._replace(across=True, climb=True)
-    (found,) = motion._outcomes(log, mine, enu(), enough, [], "sample", "sample")
-    legal = Distortion(name="no change", message=(VISION,), set={"x": "x"})
-    (silent,) = motion._outcomes(log, mine, next(cases(legal)), enough, [], "sample", "sample")
-    wrong = next(cases(legal))._replace(codes=("MFC401",))
-    (missed,) = motion._outcomes(log, mine, wrong, enough, [], "sample", "sample")
-    assert (found.word, silent.word, missed.word) == ("found", "silent", "missed")
+    piece = _Piece(log, "sample", "whole", [])
+    return [outcome.word for outcome in motion._fared(piece, mine, case, enough)]
+
+
+def test_a_distortion_is_found_and_a_legal_one_leaves_silence(log: Log) -> None:
+    """The words of the outcomes, on the sample."""
+    legal = next(cases(Distortion(name="no change", message=(VISION,), set={"x": "x"})))
+    assert fared(log, enu()) == ["found"]
+    assert fared(log, legal) == ["silent"]
+    assert fared(log, legal._replace(codes=("MFC401",))) == ["missed"]
 
 
 def test_another_answer_is_none(log: Log) -> None:
     """The right code with the wrong words is not found, and another code is an alarm."""
-    (mine,) = motion._streams(log, VISION)
-    enough = excitation(log, mine)._replace(across=True, climb=True)
-    words = enu()._replace(says="x holds West")
-    other = enu()._replace(codes=("MFC404",))
-    assert [o.word for o in motion._outcomes(log, mine, words, enough, [], "s", "s")] == ["words"]
-    assert [o.word for o in motion._outcomes(log, mine, other, enough, [], "s", "s")] == [
-        "missed",
-        "alarm",
-    ]
+    assert fared(log, enu()._replace(says="x holds West")) == ["words"]
+    assert fared(log, enu()._replace(codes=("MFC404",))) == ["missed", "alarm"]
 
 
 def test_a_vehicle_that_stands_has_no_excitation(log: Log) -> None:
     """Before take-off there is nothing to tell by."""
-    ground = motion._piece(log, "ground")
+    ground = motion._cut(log, "ground")
     assert ground is None or not motion._streams(ground, VISION)
     (mine,) = motion._streams(log, VISION)
     flown = excitation(log, mine)
@@ -103,7 +101,7 @@ def test_a_vehicle_that_stands_has_no_excitation(log: Log) -> None:
 
 
 def outcome(word: str) -> Outcome:
-    return Outcome("axes", "axes: x, y, -z", "sample", True, word)
+    return Outcome("axes", "axes: x, y, -z", "sample", word)
 
 
 @pytest.mark.parametrize(
