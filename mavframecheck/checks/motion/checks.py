@@ -243,12 +243,17 @@ class QuarterTurn(MotionCheck):
 
     def concerns(self, subject: judging.Subject) -> bool:
         """Return whether a stream has a heading that must be from north."""
-        said = (subject.place, subject.lie, subject.speed)
-        return any(each != judging.NOTHING for each in said) and not subject.frame.free_heading
+        told = any(each != judging.NOTHING for each in self._said(subject))
+        return told and not subject.frame.free_heading
+
+    def _said(self, subject: judging.Subject) -> tuple[axes.Fit | attitude.Lie | str, ...]:
+        """Return what has a heading; that of a velocity alone is told by quarter turns only."""
+        speed = (subject.speed,) if self.quarters else ()
+        return (subject.place, *speed, subject.lie)
 
     def why_not(self, subject: judging.Subject) -> str:
         """Return what was missing to tell."""
-        said = (subject.place, subject.speed, subject.lie)
+        said = self._said(subject)
         if any(isinstance(each, axes.Fit) and not each.yaw_known for each in said):
             return "it does not move both north-south and east-west"
         if isinstance(subject.lie, attitude.Lie) and "yaw_offset" not in subject.lie.told:
