@@ -30,8 +30,6 @@ _FASTEST_MPS = 30.0
 _EARLIEST_S, _LATEST_S, _FINE_S = -0.6, 1.5, 0.02
 """Delays that are tried, s."""
 _SHORT_S = 0.2
-_FOLLOWS = 0.985
-"""Correlation from which on it can be said that there is no delay."""
 _TORN_S = 1.0
 
 
@@ -182,6 +180,11 @@ class StreamDelay(ClockCheck):
         late = fit.delay_s >= self.params["min_delay_s"]
         return bool(clear and moving and alike_enough and inside and late)
 
+    def _prompt(self, fit: Fit) -> bool:
+        """Return whether a track surely has no delay: one would cost more than what does not follow anyway."""
+        follows = 1 - fit.inert >= 2 * (1 - fit.correlation)
+        return bool(follows and fit.delay_s < self.params["min_delay_s"])
+
     def verdict(self) -> Verdict:
         """Return the rows compared, or why they could not be."""
         streams = [
@@ -199,9 +202,9 @@ class StreamDelay(ClockCheck):
         fits = [fit for timing in judged if (fit := self._fit(timing)) is not None]
         if all(fit.spread_mps < self.params["min_spread_mps"] for fit in fits):
             return Verdict(0, "the vehicle hardly moved, or its position is not in the recording")
-        alike_enough = [fit for fit in fits if fit.correlation >= _FOLLOWS or self._late(fit)]
+        alike_enough = [fit for fit in fits if self._prompt(fit) or self._late(fit)]
         if not alike_enough:
-            return Verdict(0, "its speed does not follow the vehicle's closely")
+            return Verdict(0, f"its speed follows the vehicle's too roughly to tell {_SHORT_S} s")
         if all(1 - fit.inert < self.params["min_gain"] for fit in alike_enough):
             return Verdict(
                 0, f"the vehicle's speed changes too slowly to show a delay of {_SHORT_S} s"
