@@ -41,6 +41,7 @@ generate: $(READY)  ## write again what is generated into the package
 	$(BIN)/python -m mavframecheck.semantics.acceptance
 	$(BIN)/python -m mavframecheck.engine.pack
 	$(BIN)/python -m mavframecheck.report.schema
+	$(BIN)/python -m tools.plot_fit
 	$(BIN)/python -m tools.pages.rules
 	$(BIN)/python -m tools.pages.shown
 
@@ -58,7 +59,7 @@ accuracy: $(READY)  ## labelled recordings: found, missed, false alarms; real on
 	$(BIN)/python -m benchmarks.accuracy --corpus $(CORPUS)
 	$(BIN)/python -m benchmarks.adjudicated --corpus $(CORPUS)
 
-injection: $(READY)  ## mistakes written into clean recordings: which are found (about four minutes)
+injection: $(READY)  ## mistakes written into clean recordings: which are found (ten minutes; ONLY=motion: six)
 	$(BIN)/python -m benchmarks.injection --corpus $(CORPUS) $(if $(ONLY),--only $(ONLY))
 
 corpus-frames: $(READY)  ## every frame of every recording against pymavlink (about three minutes)

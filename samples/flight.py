@@ -100,6 +100,9 @@ class Flight:
     stack: Stack = ARDUCOPTER
     sides: int = 1
     odometry: bool = False
+    vision: bool = False
+    late_s: float = 0.0
+    """How old the vision estimate is when it is stamped, s."""
     dice: random.Random = field(default_factory=lambda: random.Random(7))
 
     @property
@@ -172,6 +175,8 @@ class Flight:
         yield self._stream(COMPANION, SETPOINT, 0.5, guided, setpoint)
         if self.odometry:
             yield self._stream(COMPANION, "ODOMETRY", 0.2, (CLIMB_S, self.land_s), odometry)
+        if self.vision:
+            yield self._stream(COMPANION, VISION, 0.2, (CLIMB_S, self.land_s), vision)
 
     def _stream(
         self, sender: tuple[int, int], message: str, period: float, when: Vector2, tell: Tell
@@ -200,6 +205,7 @@ class Flight:
 Tell = Callable[[Flight, State], Fields]
 Vector2 = tuple[float, float]
 SETPOINT = "SET_POSITION_TARGET_LOCAL_NED"
+VISION = "VISION_POSITION_ESTIMATE"
 NAV_TAKEOFF, DO_SET_MODE, ARM_DISARM = 22, 176, 400
 
 
@@ -363,6 +369,15 @@ def odometry(flight: Flight, now: State) -> Fields:
     errors = {"pose_covariance": diagonal(0.01, 0.001), "velocity_covariance": diagonal(0.02, 0.01)}
     pose = {"time_usec": now.boot_ms * 1000, "x": x, "y": y, "z": z, "q": quaternion(now)}
     return pose | twist | body_rates(flight, now) | frames | errors | {"reset_counter": 0}
+
+
+def vision(flight: Flight, now: State) -> Fields:
+    """Return a camera's estimate of the pose in the vehicle's local frame."""
+    seen = flight.at(now.t - flight.late_s)
+    x, y, z = (p + flight.noise(0.01) for p in seen.position)
+    angles = {"roll": seen.roll, "pitch": seen.pitch, "yaw": math.remainder(seen.yaw, math.tau)}
+    errors = {"covariance": diagonal(0.01, 0.001), "reset_counter": 0}
+    return {"usec": now.boot_ms * 1000, "x": x, "y": y, "z": z} | angles | errors
 
 
 def body_velocity(now: State) -> Vector:

@@ -17,11 +17,15 @@ import dpkt
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from samples import flight, missions
-from samples.flight import COMPANION, GCS, PX4, SETPOINT, START_US, Fields, Flight, Said
+from samples.flight import COMPANION, GCS, PX4, SETPOINT, START_US, VISION, Fields, Flight, Said
 
 HERE = Path(__file__).parent
 FAULTY_S = (20.0, 23.0)
 """When the fault of a sample shows, s from its start, where it does not show throughout."""
+ALWAYS = (0.0, math.inf)
+FROZEN_S = (24.0, 36.0)
+MOVING = 2
+"""Sides of the square that show which way axes point."""
 GLOBAL_SETPOINT = "SET_POSITION_TARGET_GLOBAL_INT"
 MESSAGES = {message.msgname: message for message in dialect.mavlink_map.values()}
 
@@ -110,7 +114,7 @@ def changed(traffic: Traffic, message: str, change: Change, during: tuple[float,
 
 def faulty_field(message: str, change: Change, *, always: bool = False) -> Callable[[], bytes]:
     """Return a maker of a log in which some fields of one message are wrong."""
-    during = (0.0, math.inf) if always else FAULTY_S
+    during = ALWAYS if always else FAULTY_S
     known = Flight(odometry=message == "ODOMETRY")
     return lambda: tlog(pack(changed(known.traffic(), message, change, during)))
 
@@ -123,6 +127,46 @@ def values(**fields: object) -> Change:
 def stretched_quaternion(fields: Fields) -> Fields:
     """Return the quaternion with a length of 0.9."""
     return {"q": [0.9 * part for part in fields["q"]]}
+
+
+def moving(
+    message: str, change: Change, during: tuple[float, float] = ALWAYS
+) -> Callable[[], bytes]:
+    """Return a maker of a longer flight in which an estimate of the pose is wrong."""
+    known = Flight(sides=MOVING, odometry=message == "ODOMETRY", vision=message == VISION)
+    return lambda: tlog(pack(changed(known.traffic(), message, change, during)))
+
+
+def east_north_up(fields: Fields) -> Fields:
+    """Return the pose in east-north-up, with front-left-up axes of the body."""
+    place = {"x": fields["y"], "y": fields["x"], "z": -fields["z"]}
+    return place | {"pitch": -fields["pitch"], "yaw": math.pi / 2 - fields["yaw"]}
+
+
+def turned(degrees: float) -> Change:
+    """Return a change to a frame whose x points so far clockwise from north."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+
+    def change(f: Fields) -> Fields:
+        yaw = math.remainder(f["yaw"] - math.radians(degrees), math.tau)
+        return {"x": c * f["x"] + s * f["y"], "y": c * f["y"] - s * f["x"], "yaw": yaw}
+
+    return change
+
+
+def scaled(factor: float) -> Change:
+    """Return a change to positions that are too long."""
+    return lambda f: {name: factor * f[name] for name in ("x", "y", "z")}
+
+
+def world_velocity(fields: Fields) -> Fields:
+    """Return the velocity turned out of the axes of the body."""
+    w, x, y, z = fields["q"]
+    vx, vy, vz = fields["vx"], fields["vy"], fields["vz"]
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    north = vx + w * tx + y * tz - z * ty
+    east = vy + w * ty + z * tx - x * tz
+    return {"vx": north, "vy": east, "vz": vz + w * tz + x * ty - y * tx}
 
 
 def faulty_global(**fields: object) -> Callable[[], bytes]:
@@ -210,6 +254,9 @@ SAMPLES = (
     Sample("clean_copter.tlog", (), "Nothing: ArduCopter.", clean(tlog, Flight(sides=4))),
     Sample("clean_px4.tlog", (), "Nothing: PX4.", clean(tlog, Flight(PX4))),
     Sample("clean_odometry.tlog", (), "Nothing: visual odometry.", clean(tlog, Flight(odometry=True))),
+    Sample(
+        "clean_vision.tlog", (), "Nothing: a camera.", clean(tlog, Flight(sides=MOVING, vision=True))
+    ),
     Sample("clean_link.raw", (), "Nothing: frames without stamps.", clean(raw, Flight())),
     Sample("clean_link.pcap", (), "Nothing: captured from a network.", clean(pcap, Flight())),
     Sample(
@@ -323,6 +370,72 @@ SAMPLES = (
         ("MFC502",),
         "Variance of x is -1, another system's word for unknown.",
         faulty_field("ODOMETRY", values(pose_covariance=CROOKED)),
+    ),
+    Sample(
+        "vision_in_enu.tlog",
+        ("MFC401",),
+        "A camera's pose in east-north-up, as robots have it.",
+        moving(VISION, east_north_up),
+    ),
+    Sample(
+        "vision_height_up.tlog",
+        ("MFC402",),
+        "A camera's position whose z is a height.",
+        moving(VISION, lambda f: {"z": -f["z"]}),
+    ),
+    Sample(
+        "vision_yaw_reversed.tlog",
+        ("MFC404",),
+        "A camera's yaw that counts counter-clockwise.",
+        moving(VISION, lambda f: {"yaw": -f["yaw"]}),
+    ),
+    Sample(
+        "odometry_velocity_of_the_world.tlog",
+        ("MFC407",),
+        "Odometry whose velocity is north-east-down and labelled forward-right-down.",
+        moving("ODOMETRY", world_velocity),
+    ),
+    Sample(
+        "odometry_quaternion_order.tlog",
+        ("MFC409",),
+        "Odometry with a quaternion x, y, z, w.",
+        moving("ODOMETRY", lambda f: {"q": [*f["q"][1:], f["q"][0]]}),
+    ),
+    Sample(
+        "odometry_quaternion_inverse.tlog",
+        ("MFC421",),
+        "Odometry with a quaternion from the world to the body.",
+        moving("ODOMETRY", lambda f: {"q": [f["q"][0], *(-part for part in f["q"][1:])]}),
+    ),
+    Sample(
+        "vision_jumps.tlog",
+        ("MFC504",),
+        "A camera's position jumps by 3 m and its reset counter stays.",
+        moving(VISION, lambda f: {"y": f["y"] + 3.0}, (30.0, math.inf)),
+    ),
+    Sample(
+        "vision_turned_frame.tlog",
+        ("MFC507",),
+        "A camera's frame that points 40 degrees east of north.",
+        moving(VISION, turned(40.0)),
+    ),
+    Sample(
+        "vision_scaled.tlog",
+        ("MFC508",),
+        "A camera's metres are too short: everything is 1.3 times as long.",
+        moving(VISION, scaled(1.3)),
+    ),
+    Sample(
+        "vision_frozen.tlog",
+        ("MFC509",),
+        "A camera's position stands still while the vehicle flies on.",
+        moving(VISION, values(x=10.0, y=0.0, z=-12.0), FROZEN_S),
+    ),
+    Sample(
+        "vision_late.tlog",
+        ("MFC813",),
+        "A camera's pose is half a second old and stamped when it is sent.",
+        clean(tlog, Flight(sides=MOVING, vision=True, late_s=0.5)),
     ),
     Sample(
         "nan_in_used_field.tlog",

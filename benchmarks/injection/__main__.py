@@ -3,6 +3,9 @@
 `benchmarks/expected.toml` says what is written where, which codes answer it, and where the method can decide.
 Recordings are also flown elsewhere: near sea level, at 500 m and at 2 000 m, in all hemispheres. Every recording
 is judged first as it is, with clean streams added: an error or warning there is a false alarm.
+
+The second part, `--only motion`, distorts whole streams of poses and velocities. Half of the recordings are for
+tuning the judge (`--tuning` shows them); the figures are those of the others.
 """
 
 from __future__ import annotations
@@ -12,11 +15,14 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from itertools import repeat
 from pathlib import Path
 
 from benchmarks.corpus import arguments, is_absent
 from benchmarks.injection.judge import FAMILIES, Outcome, Verdicts, judge_variant, known_rules
+from benchmarks.injection.motion import Motions, is_reported, judge_recording, recordings
+from benchmarks.injection.motion_table import show_motion
 from benchmarks.injection.plan import Mistake, Plan, read_plan
 
 REQUIRED_RECALL = 0.99
@@ -26,7 +32,14 @@ REQUIRED_RECALL = 0.99
 def options() -> argparse.Namespace:
     """Return the command line."""
     parser = arguments(__doc__ or "")
-    parser.add_argument("--only", nargs="*", default=[], help="codes, or beginnings of codes")
+    parser.add_argument(
+        "--only",
+        nargs="*",
+        default=[],
+        help="codes, or beginnings of codes; motion: the second part",
+    )
+    parser.add_argument("--tuning", action="store_true", help="motion: the recordings for tuning")
+    parser.add_argument("--full", action="store_true", help="motion: every case (an hour and more)")
     parser.add_argument("--recording", nargs="*", default=[], help="beginnings of names")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--all", action="store_true", help="print every case")
@@ -107,13 +120,8 @@ def show_gaps(plan: Plan, mistakes: list[Mistake], outcomes: dict[str, list[Outc
     print(f"Mistakes without a case: {'; '.join(empty) or 'none'}")
 
 
-def main() -> int:
-    """Run every mistake on every variant; 1 when a recall is short, or where there should be silence."""
-    asked = options()
-    folder: Path = asked.corpus / "sitl"
-    if is_absent(folder):
-        return 0
-    plan = read_plan()
+def measure_mistakes(plan: Plan, folder: Path, asked: argparse.Namespace) -> bool:
+    """Run every mistake on every variant; return whether all is as it must be."""
     mistakes = chosen(plan, asked.only)
     codes = tuple(asked.only) or FAMILIES
     jobs = list(variants(plan, asked.recording))
@@ -121,7 +129,36 @@ def main() -> int:
     with ProcessPoolExecutor(asked.jobs) as pool:
         for one in pool.map(judge_variant, repeat(folder), jobs, repeat(mistakes), repeat(codes)):
             verdicts.add(one)
-    return int(not show(plan, mistakes, verdicts, everything=asked.all))
+    return show(plan, mistakes, verdicts, everything=asked.all)
+
+
+def measure_motion(plan: Plan, folder: Path, asked: argparse.Namespace) -> bool:
+    """Distort the streams of one half of the recordings; return whether all is as it must be."""
+    names = recordings(folder, tuple(asked.recording) or ("",))
+    names = [name for name in names if is_reported(name) != asked.tuning]
+    distortions = list(plan.motion.distortion)
+    found = Motions()
+    with ProcessPoolExecutor(asked.jobs) as pool:
+        for one in pool.map(partial(judge_recording, folder, full=asked.full), names):
+            found.add(one)
+    half = "for tuning" if asked.tuning else "that were not used for tuning"
+    print(f"\nMotion: {len(names)} recordings {half}")
+    return show_motion(distortions, found, everything=asked.all)
+
+
+def main() -> int:
+    """Run what was asked for; 1 when a recall is short, or where there should be silence."""
+    asked = options()
+    folder: Path = asked.corpus / "sitl"
+    if is_absent(folder):
+        return 0
+    plan = read_plan()
+    good = True
+    if asked.only != ["motion"]:
+        good = measure_mistakes(plan, folder, asked)
+    if asked.only in ([], ["motion"]):
+        good &= measure_motion(plan, folder, asked)
+    return int(not good)
 
 
 if __name__ == "__main__":

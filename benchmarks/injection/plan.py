@@ -78,12 +78,54 @@ class Mistake(_Part, frozen=True):
     """Rows that get it at most: the last ones."""
 
 
+class Distortion(_Part, frozen=True):
+    """A stream that is distorted as a whole, and what is to be said of it."""
+
+    name: str
+    message: tuple[str, ...]
+    codes: tuple[str, ...] = ()
+    """Any of them must answer; none: it is legal, and nothing may."""
+    also: tuple[str, ...] = ()
+    """Codes that may come with it: consequences."""
+    says: str = ""
+    """Regular expression of the words that one of the answers must have."""
+    set: dict[str, str] = {}
+    """Field -> expression that replaces it; `k` is one of `values`."""
+    values: tuple[float, ...] = ()
+    """Each is a case."""
+    permute: tuple[str, str, str] | None = None
+    """Instead of `set`: the fields whose signed permutations are the cases, all but the right one."""
+    free_heading: bool = False
+    """Whether turns about the vertical are no mistake."""
+    needs: tuple[Literal["across", "climb", "turn", "tilt", "far", "varies", "slides"], ...] = ()
+    """The motion that the method needs to tell: see `excitation.py`."""
+    where: str = "True"
+    """Holds for every row of a stream that it is about."""
+    rows: str = "True"
+    """Rows that get it."""
+
+
+class MotionPlan(_Part, frozen=True):
+    """What is done to streams of poses and velocities."""
+
+    one_of: dict[Literal["whole", "own", "piece"], int]
+    """Of so many cases one is run: of estimates in whole recordings, of the vehicle's own streams, in pieces."""
+    seconds: float
+    """How much of each recording is used."""
+    places: tuple[str, ...]
+    """Where recordings are flown besides the place of their making."""
+    distortion: tuple[Distortion, ...]
+    stream: tuple[Stream, ...]
+    """One of them is added to each recording that has no estimate from outside."""
+
+
 class Plan(_Part, frozen=True):
     """The whole file."""
 
     place: dict[str, Spot]
     recording: tuple[Source, ...]
     mistake: tuple[Mistake, ...]
+    motion: MotionPlan
     stream: tuple[Stream, ...] = ()
     unmeasured: dict[str, str] = {}
     """Code -> why no mistake of it can be written into these recordings."""

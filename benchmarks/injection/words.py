@@ -2,8 +2,9 @@
 
 `vehicle.lat`, `home.alt` and so on are the last values that the autopilot sent before each row, in degrees,
 metres, metres per second and radians; `undulation` is that of the geoid there, `separation` what the receiver says
-of it, where it says anything; `t` counts seconds from the first
-frame, `nth` rows; `compid` is the sender's; `seen(message, field, values)` tells whether the recording has such a message; `px4`, `ardupilot`,
+of it, where it says anything; `t` counts seconds from the first frame, `nth` rows; `compid` is the sender's; `k` is the value of the case,
+`earlier(column, seconds)` what the stream said before, `noise(size)` the same random numbers in every run,
+`attitude` that of the vehicle as a quaternion, `turned(q, (x, y, z))` vectors turned by it; `seen(message, field, values)` tells whether the recording has such a message; `px4`, `ardupilot`,
 `copter`, `plane`, `rover` and `sub` say who flies. Any other name is a field of the message, as on the wire, or a
 constant of MAVLink as pymavlink spells it (`MAV_CMD_NAV_TAKEOFF`).
 """
@@ -20,6 +21,7 @@ import numpy.typing as npt
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from benchmarks.injection.log import Log
+from mavframecheck.geo import quaternions
 from mavframecheck.geo.geoid import undulation
 from mavframecheck.wire import Table
 
@@ -46,6 +48,7 @@ FACTS: dict[str, dict[str, tuple[str, str, float]]] = {
         "roll": ("ATTITUDE", "roll", 1.0),
         "pitch": ("ATTITUDE", "pitch", 1.0),
         "yaw": ("ATTITUDE", "yaw", 1.0),
+        "boot": ("ATTITUDE", "time_boot_ms", 1e-3),
     },
     "home": {
         "lat": ("HOME_POSITION", "latitude", 1e-7),
@@ -69,14 +72,30 @@ def distinct(values: Any) -> int:
     return len(np.unique(values))
 
 
+def turned(q: Any, v: Any) -> Floats:
+    """Return (n, 3) vectors, or a tuple of columns, turned by quaternions."""
+    return quaternions.turn_by(q, np.column_stack(v) if isinstance(v, tuple) else v)
+
+
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in ("where", "abs", "sin", "cos", "radians", "degrees")},
-    **{name: getattr(np, name) for name in ("hypot", "arctan2", "float32", "isnan", "minimum")},
+    **{
+        name: getattr(np, name)
+        for name in ("hypot", "arctan2", "float32", "isnan", "isfinite", "minimum")
+    },
     **{name: getattr(np, name) for name in ("maximum", "isin", "trunc", "zeros_like", "full")},
     "sqrt": np.sqrt,
     "distinct": distinct,
     "share": np.mean,
     "geoid": undulation,
+    "len": len,
+    "every": np.all,
+    "median": np.median,
+    "inverse": quaternions.inverse,
+    "times": quaternions.product,
+    "about_z": quaternions.about_z,
+    "quaternion": quaternions.quaternion_from_euler,
+    "turned": turned,
 }
 
 
@@ -103,6 +122,8 @@ class Scope(dict[str, Any]):
         """Look at `table`, rows of `log`."""
         super().__init__(FUNCTIONS, pi=np.pi, nan=np.nan, array=self._array)
         self._log, self._table = log, table
+        self.update(earlier=self._earlier, noise=self._noise)
+        self._dice = np.random.default_rng(len(table))
 
     def __missing__(self, name: str) -> Any:
         table, flies = self._table, flying(self._log)
@@ -113,6 +134,9 @@ class Scope(dict[str, Any]):
             return column.astype(np.int64 if column.dtype.kind in "iu" else np.float64)
         if name in FACTS:
             return _Subject(self._log, name, table.frames.number)
+        if name == "attitude":
+            lies = self["vehicle"]
+            return quaternions.quaternion_from_euler(lies.roll, lies.pitch, lies.yaw)
         if name in ("undulation", "separation"):
             here, gnss = self["vehicle"], self["gnss"]
             model, told = undulation(here.lat, here.lon), gnss.ellipsoid - gnss.alt
@@ -135,6 +159,16 @@ class Scope(dict[str, Any]):
         """Return (n, k) columns or numbers side by side: an array field."""
         rows = [np.broadcast_to(np.asarray(v, np.float64), len(self._table)) for v in values]
         return np.stack(rows, axis=-1)
+
+    def _earlier(self, values: Any, seconds: float) -> Any:
+        """Return what a column, or columns, held `seconds` before, at the beginning the first value."""
+        t = self._log.seconds[self._table.frames.number]
+        rows = round(seconds / max(float(np.median(np.diff(t))), 1e-3)) if len(t) > 1 else 0
+        return values[np.maximum(np.arange(len(t)) - rows, 0)]
+
+    def _noise(self, size: float) -> Floats:
+        """Return (n,) random numbers of that standard deviation."""
+        return self._dice.normal(0.0, size, len(self._table))
 
     def _seen(self, message: str, field: str, values: tuple[int, ...]) -> Any:
         """Return whether any such message in the recording has one of these values."""

@@ -39,6 +39,8 @@ class Verdict(NamedTuple):
     """Rows looked at; 0 means that the rule did not apply, or could not decide."""
     insufficient: str = ""
     """Why it could not decide, where it could not."""
+    partly: str = ""
+    """Where it looked at some streams: why it could not decide about the others."""
 
 
 class Check(ABC):
@@ -49,11 +51,17 @@ class Check(ABC):
 
     of_missions: ClassVar[bool] = False
     """Whether it judges missions, so that it also runs on mission files."""
+    only: int | None = None
+    """The sender (``sysid * 256 + compid``) that verdicts are about, where they are about one alone."""
 
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Take the parameters of the rule that names the check, and the dialect of the recording."""
         self.params = params
         self.dialect = dialect
+
+    def concerns_sender(self, sender: int) -> bool:
+        """Return whether what a sender says is to be judged."""
+        return self.only in (None, sender)
 
     @abstractmethod
     def update(self, batch: Batch, context: Context) -> None:

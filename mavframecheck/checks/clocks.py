@@ -60,7 +60,8 @@ class ClockCheck(Check):
 
     def verdict(self) -> Verdict:
         """Return the stamped rows of the streams looked at."""
-        rows = sum(timing.stream.stamped for timing in self.judged())
+        judged = (each for each in self.judged() if self.concerns_sender(each.sender))
+        rows = sum(timing.stream.stamped for timing in judged)
         if self.timed and self.clocks.timings and not self.clocks.received:
             return Verdict(0, "the recording has no receive times that can be believed")
         return Verdict(rows, self.undecided if self.clocks.timings and not rows else "")

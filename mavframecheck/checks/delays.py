@@ -29,6 +29,7 @@ _FASTEST_MPS = 30.0
 """Faster (m/s) is a leap of the origin, not a flight."""
 _EARLIEST_S, _LATEST_S, _FINE_S = -0.6, 1.5, 0.02
 """Delays that are tried, s."""
+_SHORT_S = 0.2
 _TORN_S = 1.0
 
 
@@ -41,6 +42,8 @@ class Fit(NamedTuple):
     """Correlation without delay."""
     spread_mps: float
     """Standard deviation of the speed, m/s."""
+    inert: float
+    """Correlation of the reference with itself `_SHORT_S` earlier: near 1 a delay does not show."""
 
 
 @dataclass(slots=True)
@@ -92,7 +95,8 @@ def fit_delay(track: tuple[Floats, Floats], reference: tuple[Floats, Floats]) ->
     matches = [_correlation(speed, np.interp(t - delay, at, known)) for delay in delays]
     best, none = int(np.argmax(matches)), int(np.argmin(np.abs(delays)))
     spread = float(np.std(np.interp(t, at, known)))
-    return Fit(float(delays[best]), matches[best], matches[none], spread)
+    inert = _correlation(np.interp(t, at, known), np.interp(t - _SHORT_S, at, known))
+    return Fit(float(delays[best]), matches[best], matches[none], spread, inert)
 
 
 def _correlation(a: Floats, b: Floats) -> float:
@@ -176,19 +180,33 @@ class StreamDelay(ClockCheck):
         late = fit.delay_s >= self.params["min_delay_s"]
         return bool(clear and moving and alike_enough and inside and late)
 
+    def _prompt(self, fit: Fit) -> bool:
+        """Return whether a track surely has no delay: one would cost more than what does not follow anyway."""
+        follows = 1 - fit.inert >= 2 * (1 - fit.correlation)
+        return bool(follows and fit.delay_s < self.params["min_delay_s"])
+
     def verdict(self) -> Verdict:
         """Return the rows compared, or why they could not be."""
         streams = [
             timing
             for timing in self.clocks.timings
-            if timing.stream.key.message in self._fields and not self.autopilot(timing.sender)
+            if timing.stream.key.message in self._fields
+            and not self.autopilot(timing.sender)
+            and self.concerns_sender(timing.sender)
         ]
         if not streams:
             return Verdict(0)
-        judged = self.judged()
+        judged = [timing for timing in self.judged() if self.concerns_sender(timing.sender)]
         if not judged:
             return Verdict(0, "the estimates are not stamped by the vehicle's clock")
         fits = [fit for timing in judged if (fit := self._fit(timing)) is not None]
         if all(fit.spread_mps < self.params["min_spread_mps"] for fit in fits):
             return Verdict(0, "the vehicle hardly moved, or its position is not in the recording")
+        alike_enough = [fit for fit in fits if self._prompt(fit) or self._late(fit)]
+        if not alike_enough:
+            return Verdict(0, f"its speed follows the vehicle's too roughly to tell {_SHORT_S} s")
+        if all(1 - fit.inert < self.params["min_gain"] for fit in alike_enough):
+            return Verdict(
+                0, f"the vehicle's speed changes too slowly to show a delay of {_SHORT_S} s"
+            )
         return Verdict(sum(timing.stream.stamped for timing in judged))

@@ -100,7 +100,8 @@ class _PoseCheck(Check, Generic[State]):
 
     def verdict(self) -> Verdict:
         """Return the rows followed."""
-        return Verdict(sum(found.rows for found in self._streams.values()))
+        followed = [f for key, f in self._streams.items() if self.concerns_sender(key.sender)]
+        return Verdict(sum(found.rows for found in followed))
 
 
 def _poses(
@@ -234,6 +235,21 @@ class _Standing(Found):
     """Rows with this position so far."""
     lat: float = np.nan
     lon: float = np.nan
+    heard_at: tuple[float, float] = (np.nan, np.nan)
+    """Where the vehicle was when the stream was first heard, deg."""
+    went_m: float = 0.0
+    """How far it was away from there since."""
+
+
+def _first_known(carried: float, values: Floats, start: Ints) -> Floats:
+    """Return (n,) the first value that is known from row `start` on; `carried` where that is negative."""
+    known = np.flatnonzero(np.isfinite(values))
+    if not len(known):
+        return np.where(start < 0, carried, np.nan)
+    at = known[np.minimum(np.searchsorted(known, np.maximum(start, 0)), len(known) - 1)]
+    inside = (at >= start) & (at <= np.arange(len(values)))
+    found = np.where(inside, values[at], np.nan)
+    return np.where((start < 0) & np.isfinite(carried), carried, found)
 
 
 class FrozenPose(_PoseCheck[_Standing]):
@@ -255,8 +271,8 @@ class FrozenPose(_PoseCheck[_Standing]):
         rows = np.arange(len(table))
         start = np.maximum.accumulate(np.where(fresh, rows, -1))
         count = rows - start + np.where(start < 0, found.since, 1)
-        lat0 = np.where(start < 0, found.lat, lat[start])
-        lon0 = np.where(start < 0, found.lon, lon[start])
+        lat0 = _first_known(found.lat, lat, start)
+        lon0 = _first_known(found.lon, lon, start)
         away = distance_m(lat0, lon0, lat, lon)
         moved = (count >= self.params["min_rows"]) & (away >= self.params["min_moved_m"])
         self._note(found, table, np.flatnonzero(moved), start, count, away)
@@ -264,6 +280,23 @@ class FrozenPose(_PoseCheck[_Standing]):
         found.lat, found.lon = float(lat0[-1]), float(lon0[-1])
         if start[-1] >= 0:
             found.begun = place(table.frames, int(start[-1]))
+        self._travel(found, lat, lon)
+
+    @staticmethod
+    def _travel(found: _Standing, lat: Floats, lon: Floats) -> None:
+        known = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon))
+        if not len(known):
+            return
+        if not np.isfinite(found.heard_at[0]):
+            found.heard_at = float(lat[known[0]]), float(lon[known[0]])
+        away = distance_m(*found.heard_at, lat[known], lon[known])
+        found.went_m = max(found.went_m, float(away.max()))
+
+    def verdict(self) -> Verdict:
+        """Return the rows of streams during which the vehicle went far enough."""
+        heard = [f for key, f in self._streams.items() if self.concerns_sender(key.sender)]
+        rows = sum(f.rows for f in heard if f.went_m >= self.params["min_moved_m"])
+        return Verdict(rows, "the vehicle hardly moves" if heard and not rows else "")
 
     def _note(
         self, found: _Standing, table: Table, hits: Ints, start: Ints, count: Ints, away: Floats

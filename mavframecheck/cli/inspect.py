@@ -12,6 +12,7 @@ from mavframecheck.cli.clocks import ClockTable
 from mavframecheck.cli.options import dialect_option, input_kind_option
 from mavframecheck.cli.output import echo, page_context
 from mavframecheck.cli.positions import FORMATS, Positions, Wish, position_options
+from mavframecheck.cli.sender import Integration, parse_sender
 from mavframecheck.report import Context
 from mavframecheck.report.escape import sentence
 
@@ -56,6 +57,12 @@ _PIPE_WIDTH = 100
     is_flag=True,
     help="Show whose clock each stamp is, and how it runs: offset, rate, latency, steps.",
 )
+@click.option(
+    "--sender",
+    metavar="SYS/COMP",
+    callback=parse_sender,
+    help="Say how this sender of poses or positions does in each step of integrating a sensor.",
+)
 @position_options
 @dialect_option
 @input_kind_option
@@ -69,6 +76,7 @@ def inspect(
     every_field: bool,
     origins: bool,
     clocks: bool,
+    sender: int | None,
     dialect: str,
     input_kind: str | None,
     wish: Wish | None,
@@ -78,20 +86,22 @@ def inspect(
     LOG is a file, a directory, or - for standard input. Per sender and message: rate, and for each
     field its unit, frame, direction, height reference, clock, range and how much of it is missing.
     With --positions: every position as a record instead. With --origins: where positions count from. With --clocks: the clock behind each stamp.
+    With --sender: axes, signs, scale, rotation, clock, delay, covariance, lever arm, resets and rate of one sender.
 
     Exit codes: 0 done, 2 wrong usage or a file that cannot be read, 3 nothing could be decoded.
     """
     from mavframecheck.engine import Settings
 
-    settings = Settings(dialect=dialect, input_kind=input_kind)
-    if (wish is not None) + origins + clocks > 1:
-        raise click.UsageError("choose one of --positions, --origins and --clocks")
+    settings = Settings(dialect=dialect, input_kind=input_kind, sender=sender)
+    wanted = {"origins": origins, "clocks": clocks, "sender": sender is not None}
+    if (wish is not None) + sum(wanted.values()) > 1:
+        raise click.UsageError("choose one of --positions, --origins, --clocks and --sender")
     if wish is not None:
         exporter = Positions(settings, _known(messages, dialect), wish)
         ctx.exit(exporter.show(paths, form or "csv"))
     if form in FORMATS:
         raise click.UsageError(f"--format {form} goes with --positions")
-    chosen = "origins" if origins else "clocks" if clocks else "map"
+    chosen = next((view for view, asked in wanted.items() if asked), "map")
     view = VIEWS[chosen](settings, messages)
     context = page_context()
     if not context.terminal:
@@ -157,10 +167,11 @@ class _Origins:
         return found, found.messages
 
 
-VIEWS: dict[str, type[_Map | _Origins | ClockTable]] = {
+VIEWS: dict[str, type[_Map | _Origins | ClockTable | Integration]] = {
     "map": _Map,
     "origins": _Origins,
     "clocks": ClockTable,
+    "sender": Integration,
 }
 """What `inspect` can show of a recording, by name."""
 

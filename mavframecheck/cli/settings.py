@@ -133,6 +133,7 @@ def choose(
     """Return what holds; a mistake in the file or on the command line is a usage error."""
     from mavframecheck.engine import Settings, SettingsError
     from mavframecheck.engine.config import find_config, read_config, resolve
+    from mavframecheck.wire import DEFAULT_DIALECT
 
     try:
         source = config_file or (None if isolated else find_config(Path.cwd()))
@@ -153,7 +154,7 @@ def choose(
         autopilot=config.autopilot,
         input_kind=input_kind,
         overrides=config.params,
-        **({"dialect": config.dialect} if config.dialect else {}),
+        dialect=config.dialect or DEFAULT_DIALECT,
     )
     policy = _policy(config, folder, known) if source or known else None
     written = known if update_baseline else None

@@ -41,7 +41,8 @@ def check_recording(
 ) -> tuple[FileReport, tuple[Finding, ...]]:
     """Judge an open recording."""
     reading = Reading(recording, settings, dialect)
-    runner = Runner(recording.name, chosen_rules(pack, settings), reading.context, dialect)
+    rules = chosen_rules(pack, settings)
+    runner = Runner(recording.name, rules, reading.context, dialect, only=settings.sender)
     for batch in reading.batches(progress):
         runner.update(batch)
     findings, runs = runner.finish()
@@ -63,7 +64,7 @@ def check_mission(
     upload = Upload(planned, dialect, settings.autopilot)
     chosen = chosen_rules(pack, settings)
     rules = [rule for rule in chosen if _of_missions(rule)]
-    runner = Runner(file.name, rules, Context(), dialect, upload)
+    runner = Runner(file.name, rules, Context(), dialect, upload=upload)
     runner.update(upload.batch)
     findings, runs = runner.finish()
     reason = "a mission file holds nothing that the rule is about"

@@ -44,9 +44,10 @@ class _Desk:
 class _Hall:
     """The rules on one message that listen to the same senders; its desks open with the first row."""
 
-    def __init__(self, message: str, senders: Choice) -> None:
+    def __init__(self, message: str, senders: Choice, only: int | None) -> None:
         self._message = message
         self._senders = senders
+        self._only = only
         self.rules: list[CompiledRule] = []
         self.desks: list[_Desk] = []
 
@@ -55,6 +56,8 @@ class _Hall:
         if rows is None:
             return None
         speaks = rows.context("sender.role").among(self._senders.allows)
+        if self._only is not None:
+            speaks = speaks & (rows.table.frames.sender == self._only)
         if not speaks.any():
             return None
         if not self.desks:
@@ -83,11 +86,14 @@ class Runner:
         rules: list[CompiledRule],
         context: Context,
         dialect: Dialect,
+        *,
         upload: Upload | None = None,
+        only: int | None = None,
     ) -> None:
         """Judge the recording called `file` with `rules`, learning `context` on the way.
 
         With `upload` the file is a mission: only its items are judged, and findings are placed in its text.
+        With `only`, judge what that sender says, and learn from everybody.
         """
         self._rules = [rule for rule in rules if not rule.rule.detect.check]
         self._checks: list[tuple[CompiledRule, Check]] = [
@@ -95,6 +101,9 @@ class Runner:
             for rule in rules
             if rule.rule.detect.check
         ]
+        for _, check in self._checks:
+            check.only = only
+        self._only = only
         self._context = context
         self._episodes = Episodes(file, upload.locate if upload is not None else None)
         self._judged = None if upload is None else {ITEM}
@@ -125,9 +134,16 @@ class Runner:
         runs = [self._run_of(rule) for rule in self._rules]
         for rule, check in self._checks:
             for observation in check.finish():
-                self._episodes.observe(_episode(rule, observation))
+                if self._concerns(observation.subject):
+                    self._episodes.observe(_episode(rule, observation))
             runs.append(_verdict_of(rule, check))
         return self._episodes.findings(), sorted(runs, key=lambda run: run.code)
+
+    def _concerns(self, subject: Subject) -> bool:
+        """Return whether a finding is about a sender that is judged."""
+        if self._only is None:
+            return True
+        return (subject.sysid, subject.compid) == (self._only >> 8, self._only & 0xFF)
 
     def _halls_for(self, message: str) -> list[_Hall]:
         """Return the rules on a message by whom they listen to."""
@@ -138,7 +154,7 @@ class Runner:
             for rule in self._rules:
                 if rule.may_judge(message):
                     senders = rule.rule.applies.sender
-                    hall = halls.setdefault(senders, _Hall(message, rule.senders))
+                    hall = halls.setdefault(senders, _Hall(message, rule.senders, self._only))
                     hall.rules.append(rule)
             self._halls[message] = list(halls.values())
         return self._halls[message]
@@ -335,7 +351,7 @@ def _verdict_of(rule: CompiledRule, check: Check) -> RuleRun:
         reason = verdict.insufficient
         return RuleRun(code=code, status="insufficient-data", reason=reason, checked=checked)
     if checked:
-        return RuleRun(code=code, status="ran", checked=checked)
+        return RuleRun(code=code, status="ran", checked=checked, reason=verdict.partly)
     return RuleRun(code=code, status="not-applicable", reason=_what_was_missing(rule))
 
 

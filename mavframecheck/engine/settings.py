@@ -25,5 +25,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True):
     """Family to assume where the recording does not say."""
     dialect: str = DEFAULT_DIALECT
     input_kind: str | None = None
+    sender: int | None = None
+    """``sysid * 256 + compid`` of the only sender whose messages are judged; None: everybody's."""
     overrides: dict[str, dict[str, float | str | bool]] = {}
     """Code to parameter to value."""

@@ -49,6 +49,17 @@ def test_gaps_and_leaps_of_the_origin_do_not_matter() -> None:
     assert fit.delay_s == pytest.approx(0.4, abs=0.03)
 
 
+def test_steady_speed_shows_no_delay() -> None:
+    """A speed that changes slowly is nearly the same a little earlier."""
+    t = np.arange(0, 60, 0.1)
+    slow = np.column_stack((t, 5 * t + 20 * np.sin(0.05 * t), 0 * t, 0 * t))
+    quick = np.column_stack((t, 5 * t + 2 * np.sin(2 * t), 0 * t, 0 * t))
+    for rows, inert in ((slow, True), (quick, False)):
+        fit = fit_delay(speeds(rows), speeds(rows))
+        assert fit is not None
+        assert (fit.inert > 0.99) == inert
+
+
 def test_standing_still_says_nothing() -> None:
     still = np.column_stack((np.arange(0, 30, 0.1), np.zeros((300, 3))))
     assert fit_delay(speeds(track(20, 0.4)), speeds(still)) is None

@@ -24,6 +24,7 @@ PACK = Pack(
     {file.name[:6]: str(file) for file in FILES},
 )
 EVERY_US = 40_000
+POSE = "VISION_POSITION_ESTIMATE"
 
 
 def recording(
@@ -102,6 +103,24 @@ def test_frozen() -> None:
     ((code, count),) = codes(recording(rows))
     assert code == "MFC509"
     assert count > 50
+
+
+def test_frozen_before_the_vehicle_knew_where_it_was() -> None:
+    """The way is counted from the first position that the vehicle says."""
+    data = recording([{"x": 4.0, "usec": k} for k in range(120)])
+    assert [code for code, _ in codes(data[data.index(b"\xfd", 100) - 8 :])] == ["MFC509"]
+
+
+def test_frozen_needs_a_vehicle_that_moves() -> None:
+    """A pose that stays beside a vehicle that stays is no evidence of anything."""
+    stamp = START_US.to_bytes(8, "big")
+    at = {"lat": 474_000_000, "lon": 85_000_000, "alt": 500_000}
+    data = b"".join(
+        stamp + frame("GLOBAL_POSITION_INT", at) + stamp + frame(POSE, {"x": 1.0}, (1, 191))
+        for _ in range(60)
+    )
+    run = next(run for run in judge(data, (), PACK)[0].runs if run.code == "MFC509")
+    assert (run.status, run.reason) == ("insufficient-data", "the vehicle hardly moves")
 
 
 @pytest.mark.parametrize("order", ["wrong", "right"])

@@ -177,6 +177,43 @@ def test_level_flight_does_not_tell_roll_from_pitch() -> None:
     found = attitude.compare(level, level, free_heading=False, since_s=0.0, delay_s=None)
     assert isinstance(found, attitude.Lie)
     assert found.kind == "labelled"
+    assert not {"swapped", "body"} & found.told
+    assert {"yaw_offset", "yaw_sign", "frames"} <= found.told
+
+
+def test_without_a_turn_no_yaw_is_told() -> None:
+    """A heading that stays could be off or mirrored by any angle."""
+    roll, pitch, _ = q4.euler_from_quaternion(TRUE.attitude).T
+    straight = dataclasses.replace(TRUE, attitude=q4.quaternion_from_euler(roll, pitch, 0.7))
+    found = attitude.compare(straight, straight, free_heading=False, since_s=0.0, delay_s=None)
+    assert isinstance(found, attitude.Lie)
+    assert not {"yaw_offset", "yaw_sign"} & found.told
+    assert "swapped" in found.told
+
+
+@pytest.mark.parametrize("yaw_deg", [-140.0, 0.0, 40.0])
+def test_order_of_elements_in_a_free_heading(yaw_deg: float) -> None:
+    """The heading of the frame is turned first, the elements are exchanged afterwards."""
+    turned = q4.product(q4.about_z(np.radians(yaw_deg)), TRUE.attitude)
+    stream = dataclasses.replace(TRUE, attitude=turned[:, [1, 2, 3, 0]])
+    found = attitude.compare(stream, TRUE, free_heading=True, since_s=0.0, delay_s=None)
+    assert isinstance(found, attitude.Lie)
+    assert found.kind == "order"
+
+
+def test_a_velocity_along_the_nose_tells_no_front_left_up() -> None:
+    """What never moves sideways reads the same in both."""
+    ahead = np.column_stack((np.full(len(TRUE.t), 5.0), np.zeros((len(TRUE.t), 2))))
+    yaw = q4.quaternion_from_euler(0, 0, 0.3 * TRUE.t)
+    world = q4.turn_by(yaw, ahead)
+    place = np.cumsum(world, axis=0) * 0.1
+    true = dataclasses.replace(TRUE, attitude=yaw, place=place)
+    stream = dataclasses.replace(true, velocity=ahead)
+    found = twist.compare(stream, true, true, body=True, yaw=0.0, delay_s=0.0, rate=1.0)
+    assert isinstance(found, twist.Twist)
+    assert found.kind == "labelled"
+    assert "flu" not in found.told
+    assert "world" in found.told
 
 
 @pytest.mark.parametrize("written", ["body", "world", "inverse", "flu", "enu"])

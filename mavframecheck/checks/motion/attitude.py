@@ -27,6 +27,10 @@ MIN_TURN = np.radians(30.0)
 """Yaw must change by so much, rad, before an offset is told from a sign."""
 
 
+NEED_TURN = ("yaw_offset", "yaw_sign")
+"""Kinds of readings that show only where the yaw changes."""
+
+
 class Reading(NamedTuple):
     """How the attitude of a stream may be meant."""
 
@@ -35,6 +39,12 @@ class Reading(NamedTuple):
     of: Callable[[Floats], Floats]
     """From (n, 4) `ned_from_frd` to what the stream would hold."""
     free_yaw: bool = False
+    back: Callable[[Floats], Floats] | None = None
+    """What undoes `of`, where doing it again does not."""
+
+    def undo(self, q: Floats) -> Floats:
+        """Return (n, 4) `ned_from_frd` from what the stream holds."""
+        return self.of(q) if self.back is None else self.back(q)
 
 
 def _euler(
@@ -65,7 +75,12 @@ READINGS = (
         _euler(lambda r, p, y: (r, p, -y)),
         free_yaw=True,
     ),
-    Reading("order", "its elements are x, y, z, w", lambda q: q[:, [1, 2, 3, 0]]),
+    Reading(
+        "order",
+        "its elements are x, y, z, w",
+        lambda q: q[:, [1, 2, 3, 0]],
+        back=lambda q: q[:, [3, 0, 1, 2]],
+    ),
     Reading("inverse", "it is the inverse (from the world to the body)", q4.inverse),
     Reading("swapped", "roll and pitch have changed places", _euler(lambda r, p, y: (p, r, y))),
     Reading("body", "pitch has the wrong sign", _euler(lambda r, p, y: (r, -p, y))),
@@ -102,6 +117,8 @@ class Lie(NamedTuple):
     seconds: float
     delay_s: float
     times: tuple[float, float]
+    told: frozenset[str]
+    """Kinds of readings that would have shown: the vehicle turned and tilted enough for them."""
 
 
 def compare(
@@ -147,45 +164,65 @@ class _Read(NamedTuple):
     @property
     def mean(self) -> float:
         """Mean of the smallest nine tenths of the differences, rad."""
-        kept = np.sort(self.off)[: max(1, round(0.9 * len(self.off)))]
-        return float(kept.mean())
+        return _usual(self.off)
+
+
+def _usual(off: Floats) -> float:
+    kept = np.sort(off)[: max(1, round(0.9 * len(off)))]
+    return float(kept.mean())
 
 
 def _read(reading: Reading, mine: Floats, theirs: Floats, *, free_heading: bool) -> _Read:
     predicted = reading.of(theirs)
     yaw = 0.0
     if free_heading or reading.free_yaw:
-        turns = q4.twist(q4.product(mine, q4.inverse(predicted)))
+        turns = q4.twist(q4.product(reading.undo(mine), q4.inverse(theirs)))
         yaw = float(np.angle(np.exp(1j * turns).sum()))
         yaw += float(np.median(np.angle(np.exp(1j * (turns - yaw)))))
-        predicted = q4.product(q4.about_z(yaw), predicted)
+        predicted = reading.of(q4.product(q4.about_z(yaw), theirs))
     heading = np.exp(1j * q4.euler_from_quaternion(theirs)[:, 2])
     spread = np.abs(np.angle(heading / (heading.mean() or 1.0)))
-    turned = float(np.percentile(spread, 95)) * 2
+    turned = float(np.percentile(spread, 85)) * 2  # more than the mean leaves out
     off = q4.angle_between(mine, predicted)
     return _Read(reading, off, predicted, float(np.angle(np.exp(1j * yaw))), turned)
 
 
 def _choose(reads: list[_Read], delay_s: float, times: tuple[float, float]) -> Lie | str:
     labelled = reads[0]
+    hidden = {read.reading.kind for read in reads[1:] if not _shows(read, labelled)}
+    told = frozenset(read.reading.kind for read in reads[1:]) - hidden
     ranked = sorted(reads[1:], key=lambda read: round(np.degrees(read.mean) * 2))
     if labelled.mean <= ranked[0].mean * 1.05 + np.radians(0.3):
-        return _lie(labelled, labelled, labelled.off >= 0, delay_s, times)
+        return _lie(labelled, labelled, labelled.off >= 0, delay_s, times, told)
     for read in ranked[:1]:
         telling = q4.angle_between(read.predicted, labelled.predicted) > TELLING
         if np.count_nonzero(telling) < MIN_TELLING:
             break
-        lie = _lie(read, labelled, telling, delay_s, times)
-        needs_turn = read.reading.kind in ("yaw_offset", "yaw_sign")
-        if needs_turn and read.turned < MIN_TURN:
+        lie = _lie(read, labelled, telling, delay_s, times, told)
+        if read.reading.kind in NEED_TURN and read.turned < MIN_TURN:
             return "the vehicle hardly turns"
         if lie.left < FITS and lie.left < CLEARLY * lie.labelled:
             return lie
-    return _lie(labelled, labelled, labelled.off >= 0, delay_s, times)
+    undecided = told - {ranked[0].reading.kind}
+    return _lie(labelled, labelled, labelled.off >= 0, delay_s, times, undecided)
+
+
+def _shows(read: _Read, labelled: _Read) -> bool:
+    """Return whether a reading, were it the right one, would differ from the label for long enough."""
+    if read.reading.kind in NEED_TURN:
+        return bool(read.turned >= MIN_TURN)
+    apart = q4.angle_between(read.reading.of(labelled.predicted), labelled.predicted)
+    enough = np.count_nonzero(apart > TELLING) >= MIN_TELLING
+    return bool(enough and _usual(apart) > TELLING / 5)
 
 
 def _lie(
-    read: _Read, labelled: _Read, telling: Bools, delay_s: float, times: tuple[float, float]
+    read: _Read,
+    labelled: _Read,
+    telling: Bools,
+    delay_s: float,
+    times: tuple[float, float],
+    told: frozenset[str],
 ) -> Lie:
     return Lie(
         read.reading.kind,
@@ -196,4 +233,5 @@ def _lie(
         float(np.count_nonzero(telling) * GRID_S),
         delay_s,
         times,
+        told,
     )

@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 SPANS_S = (1.0, 4.0)
-"""Displacements are taken over the first of these, s, over which the vehicle moved enough."""
+"""Displacements are taken over the first of these, s, over which the vehicle moved enough and noise does not hide it."""
 GRID_S = 0.1
 """Times at which they are compared lie at least this far apart, s."""
 MAX_TIMES = 1500
@@ -133,7 +133,10 @@ def compare(stream: Series, reference: Series, frame: Frame) -> Fit | Undecided:
         if isinstance(steps, Undecided):
             why = steps.why
             continue
-        return _judge(steps, frame)
+        found = _judge(steps, frame)
+        if isinstance(found, Fit):
+            return found
+        why = found.why
     return Undecided(why)
 
 

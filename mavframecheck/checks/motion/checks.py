@@ -36,6 +36,7 @@ class MotionCheck(Check):
     def update(self, batch: Batch, context: Context) -> None:
         """Let the judge that all these rules share hear a batch."""
         self._judge = judging.Judge.of(context)
+        self._judge.only = self.only
         self._judge.update(batch, context)
 
     def finish(self) -> Iterable[Observation]:
@@ -64,12 +65,11 @@ class MotionCheck(Check):
 
     def verdict(self) -> Verdict:
         """Return the rows of streams that could be told, else what was missing."""
-        concerned = list(self._subjects())
-        told = [subject for subject in concerned if self.why_not(subject) == ""]
-        if told or not concerned:
-            return Verdict(sum(subject.track.rows for subject in told))
-        reasons = {f"{each.track.key.message}: {self.why_not(each)}" for each in concerned}
-        return Verdict(0, "; ".join(sorted(reasons)))
+        concerned = [(each, self.why_not(each)) for each in self._subjects()]
+        reasons = {f"{each.track.key.message}: {why}" for each, why in concerned if why}
+        rows = sum(each.track.rows for each, why in concerned if not why)
+        missing = "; ".join(sorted(reasons))
+        return Verdict(rows, partly=missing) if rows else Verdict(0, missing)
 
     @abstractmethod
     def concerns(self, subject: judging.Subject) -> bool:
@@ -107,6 +107,8 @@ class _Axes(MotionCheck):
         fits = [each for each in (subject.place, subject.speed) if isinstance(each, axes.Fit)]
         if not fits:
             return next((each for each in reasons if each != judging.NOTHING), "")
+        if all(fit.kind == "undecided" for fit in fits):
+            return "its motion is along none of the vehicle's axes"
         return "" if any(self.known(fit) for fit in fits) else self.missing
 
     missing = "it does not move both north-south and east-west"
@@ -191,7 +193,11 @@ class _Poses(MotionCheck):
 
     def why_not(self, subject: judging.Subject) -> str:
         """Return what was missing to tell."""
-        return subject.lie if isinstance(subject.lie, str) else ""
+        if isinstance(subject.lie, str):
+            return subject.lie
+        return "" if set(self.lies) <= subject.lie.told else self.missing
+
+    missing = "the vehicle hardly turns"
 
     def told(self, subject: judging.Subject) -> Values | None:
         """Return how the attitude is to be read; nothing where the whole pose is in other axes."""
@@ -237,17 +243,23 @@ class QuarterTurn(MotionCheck):
 
     def concerns(self, subject: judging.Subject) -> bool:
         """Return whether a stream has a heading that must be from north."""
-        posed = subject.place != judging.NOTHING or subject.lie != judging.NOTHING
-        return posed and not subject.frame.free_heading
+        told = any(each != judging.NOTHING for each in self._said(subject))
+        return told and not subject.frame.free_heading
+
+    def _said(self, subject: judging.Subject) -> tuple[axes.Fit | attitude.Lie | str, ...]:
+        """Return what has a heading; that of a velocity alone is told by quarter turns only."""
+        speed = (subject.speed,) if self.quarters else ()
+        return (subject.place, *speed, subject.lie)
 
     def why_not(self, subject: judging.Subject) -> str:
         """Return what was missing to tell."""
-        place, lie = subject.place, subject.lie
-        if (isinstance(place, axes.Fit) and place.yaw_known) or isinstance(lie, attitude.Lie):
-            return ""
-        if isinstance(place, axes.Fit):
+        said = self._said(subject)
+        if any(isinstance(each, axes.Fit) and not each.yaw_known for each in said):
             return "it does not move both north-south and east-west"
-        return lie if place == judging.NOTHING else place
+        if isinstance(subject.lie, attitude.Lie) and "yaw_offset" not in subject.lie.told:
+            return "the vehicle hardly turns"
+        reasons = (each for each in said if isinstance(each, str) and each != judging.NOTHING)
+        return next(reasons, "")
 
     def told(self, subject: judging.Subject) -> Values | None:
         """Return by how much the heading is off."""
@@ -255,6 +267,9 @@ class QuarterTurn(MotionCheck):
         if isinstance(place, axes.Fit) and place.kind in ("turned", "quarter"):
             points = float(np.degrees(-place.yaw))  # where x points, seen from north
             values = {**fit_values(place), "what": "frame", "yaw_deg": points}
+        elif isinstance(subject.speed, axes.Fit) and subject.speed.kind == "quarter":
+            points = float(np.degrees(-subject.speed.yaw))
+            values = {**fit_values(subject.speed), "what": "velocity", "yaw_deg": points}
         elif (
             isinstance(lie, attitude.Lie)
             and lie.kind == "yaw_offset"
@@ -288,6 +303,7 @@ class EulerSwapped(_Poses):
     """Roll and pitch that have changed places."""
 
     lies = ("swapped",)
+    missing = "the vehicle hardly tilts"
 
 
 class QuaternionOrder(_Poses):
@@ -313,10 +329,8 @@ class QuaternionOrder(_Poses):
 
     def verdict(self) -> Verdict:
         """Return the rows that could be told."""
-        poses = super().verdict()
-        if self._setpoints.rows:
-            return Verdict(poses.checked + self._setpoints.rows)
-        return poses
+        poses, rows = super().verdict(), self._setpoints.rows(self.only)
+        return Verdict(poses.checked + rows, partly=poses.partly) if rows else poses
 
 
 class BodyAxes(MotionCheck):
@@ -328,9 +342,14 @@ class BodyAxes(MotionCheck):
 
     def why_not(self, subject: judging.Subject) -> str:
         """Return what was missing to tell."""
-        both = [each for each in (subject.lie, subject.twist) if each != judging.NOTHING]
-        reasons = [each for each in both if isinstance(each, str)]
-        return reasons[0] if len(reasons) == len(both) else ""
+        lie, turn = subject.lie, subject.twist
+        if isinstance(turn, twist.Twist):
+            return "" if "flu" in turn.told else "the vehicle moves along its nose alone"
+        if turn != judging.NOTHING:
+            return turn
+        if isinstance(lie, str):
+            return lie
+        return "" if "body" in lie.told else "the vehicle hardly tilts"
 
     def told(self, subject: judging.Subject) -> Values | None:
         """Return which reading fits."""
@@ -361,12 +380,13 @@ def twist_values(turn: twist.Twist) -> Values:
 class PoseRotation(_Poses):
     """Quaternions that do not belong to their position: the inverse, or of other axes."""
 
-    lies = ("inverse", "frames", "body", "yaw_sign", "swapped")
+    lies = ("inverse", "frames", "body")
+    missing = "the vehicle hardly turns and tilts"
     rotation = True
 
-    def counts(self, subject: judging.Subject, lie: attitude.Lie) -> bool:
+    def counts(self, subject: judging.Subject, _lie: attitude.Lie) -> bool:
         """Return whether it is a quaternion: angles have rules of their own."""
-        return not _euler(subject) and (lie.kind not in ("yaw_sign", "swapped"))
+        return not _euler(subject)
 
 
 class VectorFrame(MotionCheck):
@@ -378,7 +398,11 @@ class VectorFrame(MotionCheck):
 
     def why_not(self, subject: judging.Subject) -> str:
         """Return what was missing to tell."""
-        return subject.twist if isinstance(subject.twist, str) else ""
+        turn = subject.twist
+        if isinstance(turn, str):
+            return turn
+        other = turn.told & {"world", "body"}
+        return "" if other else "the vehicle points along the axes of the world"
 
     def told(self, subject: judging.Subject) -> Values | None:
         """Return which axes fit; nothing where the whole pose is in other axes."""
@@ -397,13 +421,13 @@ class EstimateScale(MotionCheck):
 
     def why_not(self, subject: judging.Subject) -> str:
         """Return what was missing to tell."""
-        if isinstance(subject.place, str):
-            return subject.place
-        return (
-            ""
-            if self._sure(subject.place)
-            else f"less than {self.params['min_track_m']:.0f} m of track"
-        )
+        fit = subject.place
+        if isinstance(fit, str):
+            return fit
+        if fit.track_m < self.params["min_track_m"]:
+            return f"less than {self.params['min_track_m']:.0f} m of track"
+        sure = self._sure(fit) and fit.kind != "undecided"
+        return "" if sure else "its motion does not follow the vehicle's closely"
 
     def _sure(self, fit: axes.Fit) -> bool:
         per_step = fit.track_m and fit.residual_m <= self.params["max_residual_share"] * _step_m(

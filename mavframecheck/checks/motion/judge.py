@@ -103,6 +103,8 @@ class Judge:
 
     def __init__(self) -> None:
         """Listen with nothing heard so far."""
+        self.only: int | None = None
+        """The sender whose streams are judged; None: everybody's."""
         self._tracks = Tracks()
         self._batch: weakref.ref[Batch] | None = None
         self.parameters: dict[tuple[int, bytes], float] = {}
@@ -144,7 +146,8 @@ class Judge:
 
     def _judged(self) -> Iterator[Subject]:
         for track in list(self._tracks.tracks.values()):
-            if track.key.message in (*POSES, *VELOCITIES):
+            asked = self.only in (None, track.key.sender)
+            if asked and track.key.message in (*POSES, *VELOCITIES):
                 system = self._about(track.key.sender)
                 own = self._roles[track.key.sender] == "autopilot"
                 if not (own and track.key.message == "ODOMETRY"):

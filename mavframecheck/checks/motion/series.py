@@ -80,7 +80,8 @@ class Series:
     def steps(self, at: Floats, span_s: float) -> Floats:
         """Return (k, 3) how far it went in the `span_s` around times `at`, m, NaN across gaps."""
         went = self.places(at + span_s / 2) - self.places(at - span_s / 2)
-        return np.where(np.abs(went).max(axis=1, keepdims=True) < APART_M / 2, went, np.nan)
+        level = np.abs(went[:, :2])  # heights may be unknown
+        return np.where(level.max(axis=1, keepdims=True) < APART_M / 2, went, np.nan)
 
     def integrated(self, rate: float) -> Series:
         """Return the same with a position that its velocity adds up to; `rate` is vehicle per receive time."""

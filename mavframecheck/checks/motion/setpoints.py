@@ -53,10 +53,10 @@ class OrderOfSetpoints:
         """Know no stream yet."""
         self._streams: dict[int, _Stream] = {}
 
-    @property
-    def rows(self) -> int:
-        """Setpoints that could be compared with the attitude of the vehicle."""
-        return sum(stream.rows for stream in self._streams.values())
+    def rows(self, sender: int | None = None) -> int:
+        """Return how many setpoints, of one sender or all, could be compared with the vehicle's attitude."""
+        streams = self._streams.items()
+        return sum(stream.rows for key, stream in streams if sender in (None, key >> 8))
 
     def update(self, batch: Batch, context: Context) -> None:
         """Compare each setpoint with the attitude that was said last."""

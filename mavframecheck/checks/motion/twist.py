@@ -37,6 +37,8 @@ class Twist(NamedTuple):
     labelled_mps: float
     seconds: float
     times: tuple[float, float]
+    told: frozenset[str] = frozenset()
+    """Readings that would have shown: they differ from the label for long enough."""
 
 
 _SAYS = {
@@ -102,11 +104,23 @@ def _choose(
     left = {name: trimmed_rms(each, 0.95) for name, each in off.items()}
     best = min(left, key=lambda name: left[name])
     fine = left[label] < FITS * speed or left["level"] < max(FITS * speed, 1.2 * left[best])
+    told = frozenset(
+        name for name in readings if _differ(readings[name], readings[label], FITS * speed)
+    )
+    if left[best] > FITS * speed:
+        return "the velocity follows the vehicle in no axes"
     if best in (label, "level") or fine:
-        return Twist("labelled", "", left[label], left[label], len(true) * GRID_S, times)
+        return Twist("labelled", "", left[label], left[label], len(true) * GRID_S, times, told)
     differ = np.linalg.norm(readings[best] - readings[label], axis=1) > MIN_MPS
     if np.count_nonzero(differ) < MIN_TELLING:
         return "the vehicle points along the axes of the world"
-    if left[best] > FITS * speed or left[best] > CLEARLY * left[label]:
+    if left[best] > CLEARLY * left[label]:
         return "the velocity follows the vehicle in no axes"
-    return Twist(best, _SAYS[best], left[best], left[label], len(true) * GRID_S, times)
+    return Twist(best, _SAYS[best], left[best], left[label], len(true) * GRID_S, times, told)
+
+
+def _differ(reading: Floats, label: Floats, least: float) -> bool:
+    apart = np.linalg.norm(reading - label, axis=1)
+    return bool(
+        np.count_nonzero(apart > MIN_MPS) >= MIN_TELLING and trimmed_rms(apart, 0.95) > least
+    )
