@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -87,7 +88,9 @@ class Runner:
             if rule.rule.detect.check
         ]
         self._context = context
-        self._episodes = Episodes(file)
+        self._dialect = dialect
+        self.episodes = Episodes(file)
+        """What was found so far; of the Python checks, what they said when they were last asked."""
         self._halls: dict[str, list[_Hall]] = {}
         self._tallies = {rule.rule.code: _Tally() for rule in self._rules}
 
@@ -114,10 +117,24 @@ class Runner:
             self._judge_ready(desk, desk.queue.close())
         runs = [self._run_of(rule) for rule in self._rules]
         for rule, check in self._checks:
-            for observation in check.finish():
-                self._episodes.observe(_episode(rule, observation))
+            self._observe(rule, check)
             runs.append(_verdict_of(rule, check))
-        return self._episodes.findings(), sorted(runs, key=lambda run: run.code)
+        return self.episodes.findings(), sorted(runs, key=lambda run: run.code)
+
+    def ask(self) -> Iterator[None]:
+        """Let each Python check say, one at a step, what it would if the recording ended here.
+
+        `episodes` then holds it. Copies answer, so that asking changes nothing of what comes later.
+        """
+        shared = {id(each): each for each in (self._context, self._dialect)}
+        copies = copy.deepcopy([check for _, check in self._checks], shared)
+        for (rule, _), check in zip(self._checks, copies):
+            self._observe(rule, check)
+            yield
+
+    def _observe(self, rule: CompiledRule, check: Check) -> None:
+        found = [_episode(rule, observation) for observation in check.finish()]
+        self.episodes.observe(rule.rule.code, found)
 
     def _halls_for(self, message: str) -> list[_Hall]:
         """Return the rules on a message by whom they listen to."""
@@ -209,7 +226,7 @@ class Runner:
             subject,
             describe,
         )
-        self._episodes.collect(rule, rows.table.name, label, judged)
+        self.episodes.collect(rule, rows.table.name, label, judged)
 
     def _judge_ready(self, desk: _Desk, rows: Rows | None) -> None:
         """Judge rows; where context never came, those that a rule can judge without. Count the others."""

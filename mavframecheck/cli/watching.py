@@ -1,0 +1,165 @@
+"""The loop behind `watch`: every tenth of a second what came is recorded, judged and said."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from mavframecheck.cli.output import complain
+from mavframecheck.cli.outputs import Output, output_for
+from mavframecheck.engine import Pack, RuleFileError, Settings
+from mavframecheck.engine.live.session import Session
+from mavframecheck.engine.live.watched import Watched
+from mavframecheck.model import Severity
+from mavframecheck.model.live import Change, Event
+from mavframecheck.report import Checked
+from mavframecheck.report.escape import sentence
+from mavframecheck.sources import SourceError
+from mavframecheck.sources.links.clock import Clock
+from mavframecheck.sources.links.line import FileLine, Line, LinkLine
+from mavframecheck.sources.links.recorder import Recorder
+from mavframecheck.wire import Dialect, DialectError, load_dialect
+
+CLEAN, FINDINGS, FAILED, NOTHING = 0, 1, 2, 3
+TICK_S = 0.1
+REST_S = 0.005
+"""At least so long (s) the threads that read links have the interpreter to themselves."""
+SWITCH_S = 0.001
+"""A thread that reads a link waits so long (s) for the interpreter, instead of five times as long."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wishes:
+    """What to watch, for how long, and what becomes of it."""
+
+    links: tuple[str, ...]
+    files: tuple[Path, ...] = ()
+    relay: str | None = None
+    record: Path | None = None
+    length_s: float | None = None
+    exit_on: Severity | None = None
+    fail_on: Severity = Severity.WARNING
+
+
+def watched(wishes: Wishes, pack: Pack, settings: Settings, *, form: str) -> int:
+    """Watch as the user wishes, and return the exit code."""
+    sys.setswitchinterval(SWITCH_S)
+    signal.signal(signal.SIGTERM, _interrupted)
+    try:
+        watch = Watch(wishes, pack, settings, load_dialect(settings.dialect))
+        return watch.run(output_for(form))
+    except (DialectError, RuleFileError) as error:
+        raise click.UsageError(sentence(str(error))) from error
+    except SourceError as error:
+        complain(sentence(str(error)))
+        return FAILED
+
+
+def _interrupted(_signal: int, _frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+class Watch:
+    """Some links under watch until the time is over, a finding ends it, or the user does."""
+
+    def __init__(self, wishes: Wishes, pack: Pack, settings: Settings, dialect: Dialect) -> None:
+        """Make ready to watch; SourceError when a link is none or a file cannot be used."""
+        self._wishes = wishes
+        self.clock = Clock()
+        lines = [*_links(wishes, dialect, self.clock), *map(FileLine, wishes.files)]
+        names = _recordings(wishes.record, len(lines))
+        self.watched = [
+            _watched(
+                line,
+                name,
+                Session(line.name, str(name or line.name), pack, settings, dialect),
+                self.now(),
+            )
+            for line, name in zip(lines, names)
+        ]
+        self._stopped_by_finding = False
+
+    def now(self) -> float:
+        """Return the time, s since 1970."""
+        return self.clock.now_us() * 1e-6
+
+    def run(self, output: Output) -> int:
+        """Watch until the end, telling `output`; return the exit code."""
+        for each in self.watched:
+            each.line.start()
+        began = time.monotonic()
+        length_s = self._wishes.length_s
+        with output, suppress(KeyboardInterrupt):
+            while not self._stopped_by_finding:
+                tick = time.monotonic()
+                if length_s is not None and tick - began >= length_s:
+                    break
+                self.tick(output)
+                time.sleep(max(REST_S, TICK_S - (time.monotonic() - tick)))
+        return self._end(output)
+
+    def tick(self, output: Output) -> None:
+        """Take in what came on every link, and tell."""
+        now = self.now()
+        jump_s = self.clock.jump_s()
+        if jump_s is not None:
+            text = f"the clock of this computer was set by {jump_s:+.1f} s; stamps go on as before"
+            self.watched[0].pulse.say("clock", now, text)
+        for each in self.watched:
+            said = each.tick(now)
+            output.say(said)
+            self._note(said)
+        output.show(self.watched, now)
+
+    def _note(self, said: Iterable[Change | Event]) -> None:
+        """Stop when a finding is bad enough."""
+        exit_on = self._wishes.exit_on
+        if exit_on is not None:
+            self._stopped_by_finding |= any(
+                isinstance(each, Change)
+                and each.what in ("found", "updated")
+                and each.finding.severity.rank >= exit_on.rank
+                for each in said
+            )
+
+    def _end(self, output: Output) -> int:
+        now = self.now()
+        results, failed = [], False
+        for each in self.watched:
+            said, report, findings = each.finish(now)
+            output.say(said)
+            results.append(Checked(report, findings))
+            failed |= each.recording_failed
+        output.end(results)
+        return FAILED if failed else self._verdict(results)
+
+    def _verdict(self, results: Sequence[Checked]) -> int:
+        if self._stopped_by_finding:
+            return FINDINGS
+        if not any(each.file.messages for each in results):
+            return NOTHING
+        worst = max((f.severity.rank for each in results for f in each.findings), default=-1)
+        return FINDINGS if worst >= self._wishes.fail_on.rank else CLEAN
+
+
+def _links(wishes: Wishes, dialect: Dialect, clock: Clock) -> list[Line]:
+    return [LinkLine(link, wishes.relay, dialect, clock) for link in wishes.links]
+
+
+def _recordings(path: Path | None, count: int) -> list[Path | None]:
+    """Return the file to record each of `count` links to: several get a number each."""
+    if path is None or count == 1:
+        return [path] * count
+    return [path.with_stem(f"{path.stem}-{number}") for number in range(1, count + 1)]
+
+
+def _watched(line: Line, record: Path | None, session: Session, now: float) -> Watched:
+    recorder = None if record is None else Recorder(record)
+    return Watched(line, session, recorder, now)

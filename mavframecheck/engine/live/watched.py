@@ -1,0 +1,54 @@
+"""A link from its bytes to what is said of it: recorded first, then judged."""
+
+from __future__ import annotations
+
+from mavframecheck.engine.live.pulse import Pulse
+from mavframecheck.engine.live.session import Session
+from mavframecheck.model import FileReport, Finding
+from mavframecheck.model.live import Change, Event, LinkStatus
+from mavframecheck.sources.links.line import Line
+from mavframecheck.sources.links.recorder import Recorder
+
+
+class Watched:
+    """One link under watch."""
+
+    def __init__(self, line: Line, session: Session, recorder: Recorder | None, now: float) -> None:
+        """Watch `line` from `now` on (s since 1970), judge it in `session`, write it to `recorder`."""
+        self.line = line
+        self.session = session
+        self.pulse = Pulse(line.name, now)
+        self._recorder = recorder
+        self.recording_failed = False
+
+    def tick(self, now: float) -> list[Change | Event]:
+        """Take in what came by `now`; return what is to be said."""
+        for notice in self.line.notices():
+            self.pulse.note(notice.what, now, notice.text)
+        self._hear(self.line.take(), now)
+        changes = self.session.changes()
+        return [*self.pulse.events(now), *changes]
+
+    def _hear(self, records: bytes, now: float) -> None:
+        if self._recorder is not None:
+            self._recorder.write(records)
+            if self._recorder.failed and not self.recording_failed:
+                self.recording_failed = True
+                why = f"the recording stopped after {self._recorder.size} bytes: {self._recorder.failed}"
+                self.pulse.say("record", now, why)
+        batch = self.session.take(records)
+        damage = [*self.line.damage, *batch.damage]
+        self.pulse.hear(batch, damage, self.session.reading.context, now)
+
+    def status(self, now: float) -> LinkStatus:
+        """Return how the link does."""
+        written = None if self._recorder is None else self._recorder.size
+        return self.pulse.status(now, written)
+
+    def finish(self, now: float) -> tuple[list[Change | Event], FileReport, tuple[Finding, ...]]:
+        """Close the link; return what is still to be said, the report, and all findings."""
+        self._hear(self.line.close(), now)
+        if self._recorder is not None:
+            self._recorder.close()
+        report, findings = self.session.finish()
+        return [*self.pulse.events(now), *self.session.last_changes()], report, findings
