@@ -109,11 +109,6 @@ class Session:
             now = self._timer()
         self._asked_s += self._timer() - began
 
-    def ask_all(self) -> None:
-        """Ask every Python check now, however long it takes."""
-        for _ in self._runner.ask():
-            pass
-
     def finish(self) -> tuple[FileReport, tuple[Finding, ...]]:
         """Return the report of the whole link: nothing more comes."""
         self._feed.ended = True
