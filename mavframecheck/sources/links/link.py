@@ -156,7 +156,7 @@ class Link:
                 for data, peer in _received(self._connection, self._stop):
                     self._put(data, peer)
                 why = "the other side closed it"
-            except (OSError, ValueError) as error:
+            except (OSError, ValueError, ModuleNotFoundError) as error:
                 why = _said(error)
             if self._connection is not None:
                 with suppress(OSError):
@@ -251,5 +251,7 @@ def _serial(port: Any, stop: threading.Event) -> Iterator[tuple[bytes, object]]:
 
 def _said(error: Exception) -> str:
     """Return in plain words why a link cannot be opened or went away."""
+    if isinstance(error, ModuleNotFoundError) and error.name == "serial":
+        return "serial ports need pyserial: pip install 'mavframecheck[serial]'"
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return reason or type(error).__name__

@@ -19,6 +19,7 @@ from mavframecheck.model.live import Change
 from mavframecheck.wire.encode import stamped
 from samples.make import HERE
 from tests.engine.judged import Result, judge, pack_of, rule, shipped
+from tests.links import frame_size
 from tests.strategies import CUTS, DIALECT, START_US, cut, frame
 
 SAMPLES = sorted(HERE.glob("*.tlog"))[::6]
@@ -28,9 +29,7 @@ RECORDINGS = ("fault_px4_vision_enu", "clean_two_copters")
 few = settings(max_examples=2, suppress_health_check=[HealthCheck.too_slow], deadline=None)
 
 
-def live(
-    pieces: Iterable[bytes], pack: Pack | None = None
-) -> tuple[Result, list[Change]]:
+def live(pieces: Iterable[bytes], pack: Pack | None = None) -> tuple[Result, list[Change]]:
     """Judge records that come in pieces; asking takes no time here, so all checks are asked after each."""
     chosen = Settings(preview=True)
     session = Session("link", "made up", pack or shipped(), chosen, DIALECT, timer=lambda: 0.0)
@@ -109,13 +108,6 @@ def by_time(data: bytes, span_us: int) -> list[bytes]:
     return [data[a:b] for a, b in pairwise([*cuts, len(data)])]
 
 
-def frame_size(head: bytes) -> int:
-    """Return the bytes of a frame that begins with `head`."""
-    if head[0] == 0xFE:
-        return head[1] + 8
-    return head[1] + 12 + 13 * (head[2] & 1)
-
-
 def attitude(roll: float, t_s: float, number: int) -> bytes:
     return stamped(frame("ATTITUDE", {"roll": roll}, seq=number), START_US + round(t_s * 1e6))
 
@@ -127,7 +119,7 @@ def said(rolls: Iterable[tuple[float, float]], **changes: Any) -> list[list[str]
     heard = []
     for number, (roll, t_s) in enumerate(rolls):
         session.take(attitude(roll, t_s, number))
-        heard.append([each.what for each in session.changes()])
+        heard.append([str(each.what) for each in session.changes()])
     return heard
 
 
