@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mavframecheck.cli.clocks import ClockTable
+from mavframecheck.cli.contract import ContractText
 from mavframecheck.cli.options import dialect_option, input_kind_option
 from mavframecheck.cli.output import echo, page_context
 from mavframecheck.cli.positions import FORMATS, Positions, Wish, position_options
@@ -56,6 +57,11 @@ _PIPE_WIDTH = 100
     is_flag=True,
     help="Show whose clock each stamp is, and how it runs: offset, rate, latency, steps.",
 )
+@click.option(
+    "--contract",
+    is_flag=True,
+    help="Write what is sent, in which frames and how often, as a contract for 'watch --expect'.",
+)
 @position_options
 @dialect_option
 @input_kind_option
@@ -69,6 +75,7 @@ def inspect(
     every_field: bool,
     origins: bool,
     clocks: bool,
+    contract: bool,
     dialect: str,
     input_kind: str | None,
     wish: Wish | None,
@@ -78,20 +85,22 @@ def inspect(
     LOG is a file, a directory, or - for standard input. Per sender and message: rate, and for each
     field its unit, frame, direction, height reference, clock, range and how much of it is missing.
     With --positions: every position as a record instead. With --origins: where positions count from. With --clocks: the clock behind each stamp.
+    With --contract: a contract for 'watch --expect'.
 
     Exit codes: 0 done, 2 wrong usage or a file that cannot be read, 3 nothing could be decoded.
     """
     from mavframecheck.engine import Settings
 
     settings = Settings(dialect=dialect, input_kind=input_kind)
-    if (wish is not None) + origins + clocks > 1:
-        raise click.UsageError("choose one of --positions, --origins and --clocks")
+    if (wish is not None) + origins + clocks + contract > 1:
+        raise click.UsageError("choose one of --positions, --origins, --clocks and --contract")
     if wish is not None:
         exporter = Positions(settings, _known(messages, dialect), wish)
         ctx.exit(exporter.show(paths, form or "csv"))
     if form in FORMATS:
         raise click.UsageError(f"--format {form} goes with --positions")
-    chosen = "origins" if origins else "clocks" if clocks else "map"
+    asked = {"origins": origins, "clocks": clocks, "contract": contract, "map": True}
+    chosen = next(name for name, wanted in asked.items() if wanted)
     view = VIEWS[chosen](settings, messages)
     context = page_context()
     if not context.terminal:
@@ -157,10 +166,11 @@ class _Origins:
         return found, found.messages
 
 
-VIEWS: dict[str, type[_Map | _Origins | ClockTable]] = {
+VIEWS: dict[str, type[_Map | _Origins | ClockTable | ContractText]] = {
     "map": _Map,
     "origins": _Origins,
     "clocks": ClockTable,
+    "contract": ContractText,
 }
 """What `inspect` can show of a recording, by name."""
 

@@ -69,6 +69,12 @@ def _seconds(_ctx: click.Context, _param: click.Parameter, text: str | None) -> 
     help="Stop at the first finding that is at least this bad.",
 )
 @click.option(
+    "--expect",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Compare with this contract, as 'inspect --contract' writes it; exit 1 where it is broken.",
+)
+@click.option(
     "--format",
     "form",
     type=click.Choice(["text", "jsonl"]),
@@ -88,6 +94,7 @@ def watch(
     record: Path | None,
     length_s: float | None,
     exit_on: str | None,
+    expect: Path | None,
     form: str,
     plain: bool,
     fail_on: str,
@@ -118,6 +125,7 @@ def watch(
         record=record,
         length_s=length_s,
         exit_on=None if exit_on is None else Severity(exit_on),
+        expect=expect,
         fail_on=Severity(fail_on),
     )
     ctx.exit(watched(wishes, pack, settings, form="plain" if plain and form == "text" else form))

@@ -15,9 +15,11 @@ import click
 from mavframecheck.cli.output import complain
 from mavframecheck.cli.outputs import Output, output_for
 from mavframecheck.engine import Pack, RuleFileError, Settings
+from mavframecheck.engine.contract import read_contract
 from mavframecheck.engine.live.session import Session
 from mavframecheck.engine.live.watched import Watched
 from mavframecheck.model import Severity
+from mavframecheck.model.contract import Deviation
 from mavframecheck.model.live import Change, Event
 from mavframecheck.report import Checked
 from mavframecheck.report.escape import sentence
@@ -45,6 +47,7 @@ class Wishes:
     record: Path | None = None
     length_s: float | None = None
     exit_on: Severity | None = None
+    expect: Path | None = None
     fail_on: Severity = Severity.WARNING
 
 
@@ -84,6 +87,8 @@ class Watch:
             )
             for line, name in zip(lines, names)
         ]
+        self._dialect = dialect
+        self._contract = None if wishes.expect is None else read_contract(wishes.expect)
         self._stopped_by_finding = False
 
     def now(self) -> float:
@@ -93,6 +98,8 @@ class Watch:
     def run(self, output: Output) -> int:
         """Watch until the end, telling `output`; return the exit code."""
         for each in self.watched:
+            if self._contract is not None or output.wants_meaning:
+                each.learn_meaning(self._dialect, self._contract)
             each.line.start()
         began = time.monotonic()
         length_s = self._wishes.length_s
@@ -137,14 +144,17 @@ class Watch:
             output.say(said)
             results.append(Checked(report, findings))
             failed |= each.recording_failed
-        output.end(results)
-        return FAILED if failed else self._verdict(results)
+        differ = [deviation for each in self.watched for deviation in each.deviations or ()]
+        output.end(results, None if self._contract is None else differ)
+        return FAILED if failed else self._verdict(results, differ)
 
-    def _verdict(self, results: Sequence[Checked]) -> int:
+    def _verdict(self, results: Sequence[Checked], differ: Sequence[Deviation]) -> int:
         if self._stopped_by_finding:
             return FINDINGS
         if not any(each.file.messages for each in results):
             return NOTHING
+        if any(each.what != "unexpected" for each in differ):
+            return FINDINGS
         worst = max((f.severity.rank for each in results for f in each.findings), default=-1)
         return FINDINGS if worst >= self._wishes.fail_on.rank else CLEAN
 

@@ -121,6 +121,11 @@ class Runner:
             runs.append(_verdict_of(rule, check))
         return self.episodes.findings(), sorted(runs, key=lambda run: run.code)
 
+    @property
+    def judging(self) -> int:
+        """Rules with an expression that had something to judge so far."""
+        return sum(tally.checked > 0 for tally in self._tallies.values())
+
     def ask(self) -> Iterator[None]:
         """Let each Python check say, one at a step, what it would if the recording ended here.
 

@@ -6,7 +6,8 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from mavframecheck.model.finding import Finding
+from mavframecheck.model.contract import Deviation, Terms
+from mavframecheck.model.finding import Finding, Vehicle
 
 What: TypeAlias = Literal["found", "updated", "worse", "ended", "resumed", "withdrawn"]
 State: TypeAlias = Literal["waiting", "up", "silent", "closed"]
@@ -75,3 +76,49 @@ class SenderStatus(msgspec.Struct, frozen=True, kw_only=True):
     """How much later than the fastest its messages came in the last seconds, s: median; None without a clock."""
     quiet_s: float
     """Since its last frame, s."""
+
+
+class Place(msgspec.Struct, frozen=True, kw_only=True):
+    """Home or origin of a vehicle as it stands."""
+
+    system: int
+    what: Literal["home", "origin"]
+    lat: float
+    """deg"""
+    lon: float
+    """deg"""
+    alt_msl: float
+    """m"""
+    source: str
+    """The message that gave it, or who asked for it."""
+    moves: int
+    """How often it was somewhere else before."""
+
+
+class Standing(msgspec.Struct, frozen=True, kw_only=True):
+    """A finding as it stands."""
+
+    finding: Finding
+    active: bool
+    """Whether there was a hit in the last ten seconds."""
+    age_s: float
+    """Since its first hit, s."""
+    last_s: float
+    """Since its last hit, s."""
+    residuals: tuple[float, ...]
+    """What the last fits left over, oldest first: for rules about motion."""
+
+
+class View(msgspec.Struct, frozen=True, kw_only=True):
+    """All that is known of a link at one moment: what a screen shows."""
+
+    status: LinkStatus
+    senders: tuple[tuple[Vehicle, SenderStatus], ...]
+    places: tuple[Place, ...]
+    streams: tuple[Terms, ...]
+    findings: tuple[Standing, ...]
+    """Worst first, active ones before those that ended."""
+    judging: int
+    """Rules that had something to judge so far."""
+    deviations: tuple[Deviation, ...] | None
+    """Where the link differs from the contract; None without one."""

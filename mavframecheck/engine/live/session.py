@@ -67,9 +67,9 @@ class Session:
         """Judge `link` with the rules of `pack` that `settings` choose; findings are about `file`."""
         self._feed = Feed(file)
         self.reading = Reading(self._feed, settings, dialect)
-        self._runner = Runner(file, chosen_rules(pack, settings), self.reading.context, dialect)
+        self.runner = Runner(file, chosen_rules(pack, settings), self.reading.context, dialect)
         self._batches = self.reading.batches()
-        self._news = FindingNews(link, self._runner.episodes)
+        self._news = FindingNews(link, self.runner.episodes)
         self._timer = timer
         self._asking: Iterator[None] = iter(())
         self._rested_until = 0.0
@@ -86,7 +86,7 @@ class Session:
         return batch
 
     def _judge(self, batch: Batch) -> None:
-        self._runner.update(batch)
+        self.runner.update(batch)
         if len(batch) and (times := batch.frames.t_us[batch.frames.t_valid]).size:
             self.now = float(np.max(times)) * 1e-6
 
@@ -102,7 +102,7 @@ class Session:
             return
         while now - began < ASK_S:
             if next(self._asking, self) is self:
-                self._asking = self._runner.ask()
+                self._asking = self.runner.ask()
                 self._rested_until = now + self._asked_s / ASK_SHARE
                 self._asked_s = 0.0
                 break
@@ -114,7 +114,7 @@ class Session:
         self._feed.ended = True
         for batch in self._batches:
             self._judge(batch)
-        return summed_up(self.reading, self._runner)
+        return summed_up(self.reading, self.runner)
 
     def last_changes(self) -> list[Change]:
         """Return what `finish` added to the findings or took away."""

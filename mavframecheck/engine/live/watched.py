@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from mavframecheck.engine.contract import deviations
+from mavframecheck.engine.live.meaning import Meaning
 from mavframecheck.engine.live.pulse import Pulse
 from mavframecheck.engine.live.session import Session
 from mavframecheck.model import FileReport, Finding
+from mavframecheck.model.contract import Contract, Deviation, Terms
 from mavframecheck.model.live import Change, Event, LinkStatus
 from mavframecheck.sources.links.line import Line
 from mavframecheck.sources.links.recorder import Recorder
+from mavframecheck.wire import Dialect
 
 
 class Watched:
@@ -18,8 +22,26 @@ class Watched:
         self.line = line
         self.session = session
         self.pulse = Pulse(line.name, now)
+        self.streams: list[Terms] = []
+        """What every stream means, where somebody wants to know."""
+        self.deviations: tuple[Deviation, ...] | None = None
+        """Where they differ from the contract; None without one."""
+        self._contract: Contract | None = None
+        self._meaning: Meaning | None = None
         self._recorder = recorder
         self.recording_failed = False
+
+    def learn_meaning(self, dialect: Dialect, contract: Contract | None) -> None:
+        """From now on, find out what every stream means, and compare it with a contract."""
+        self._meaning = Meaning(self.session.reading, dialect)
+        self._contract = contract
+        self._compare()
+
+    def _compare(self) -> None:
+        if self._meaning is not None:
+            self.streams = self._meaning.streams
+        if self._contract is not None:
+            self.deviations = tuple(deviations(self._contract, self.streams))
 
     def tick(self, now: float) -> list[Change | Event]:
         """Take in what came by `now`; return what is to be said."""
@@ -39,6 +61,8 @@ class Watched:
         batch = self.session.take(records)
         damage = [*self.line.damage, *batch.damage]
         self.pulse.hear(batch, damage, self.session.reading.context, now)
+        if self._meaning is not None and self._meaning.take(records, now):
+            self._compare()
 
     def status(self, now: float) -> LinkStatus:
         """Return how the link does."""
@@ -51,4 +75,7 @@ class Watched:
         if self._recorder is not None:
             self._recorder.close()
         report, findings = self.session.finish()
+        if self._meaning is not None:
+            self._meaning.look(now)
+            self._compare()
         return [*self.pulse.events(now), *self.session.last_changes()], report, findings
