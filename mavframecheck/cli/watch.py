@@ -75,6 +75,11 @@ def _seconds(_ctx: click.Context, _param: click.Parameter, text: str | None) -> 
     help="Compare with this contract, as 'inspect --contract' writes it; exit 1 where it is broken.",
 )
 @click.option(
+    "--notify",
+    metavar="LINK",
+    help="Send findings as STATUSTEXT to this ground station: udpout:HOST:PORT or tcp:HOST:PORT.",
+)
+@click.option(
     "--format",
     "form",
     type=click.Choice(["text", "jsonl"]),
@@ -95,6 +100,7 @@ def watch(
     length_s: float | None,
     exit_on: str | None,
     expect: Path | None,
+    notify: str | None,
     form: str,
     plain: bool,
     fail_on: str,
@@ -114,6 +120,8 @@ def watch(
         ctx.exit(2)
     if relay is not None and len(links) != 1:
         raise click.UsageError("--relay stands behind one link: name one")
+    if notify is not None and not notify.startswith(("udpout:", "tcp:")):
+        raise click.UsageError("--notify sends to udpout:HOST:PORT or tcp:HOST:PORT")
     from mavframecheck.cli.watching import Wishes, watched
 
     pack = load_rules(directories)
@@ -126,6 +134,7 @@ def watch(
         length_s=length_s,
         exit_on=None if exit_on is None else Severity(exit_on),
         expect=expect,
+        notify=notify,
         fail_on=Severity(fail_on),
     )
     ctx.exit(watched(wishes, pack, settings, form="plain" if plain and form == "text" else form))

@@ -16,6 +16,7 @@ from mavframecheck.cli.output import complain
 from mavframecheck.cli.outputs import Output, output_for
 from mavframecheck.engine import Pack, RuleFileError, Settings
 from mavframecheck.engine.contract import read_contract
+from mavframecheck.engine.live.notify import Notifier
 from mavframecheck.engine.live.session import Session
 from mavframecheck.engine.live.watched import Watched
 from mavframecheck.model import Severity
@@ -26,6 +27,7 @@ from mavframecheck.report.escape import sentence
 from mavframecheck.sources import SourceError
 from mavframecheck.sources.links.clock import Clock
 from mavframecheck.sources.links.line import FileLine, Line, LinkLine
+from mavframecheck.sources.links.link import Inbox, Link
 from mavframecheck.sources.links.recorder import Recorder
 from mavframecheck.wire import Dialect, DialectError, load_dialect
 
@@ -48,6 +50,7 @@ class Wishes:
     length_s: float | None = None
     exit_on: Severity | None = None
     expect: Path | None = None
+    notify: str | None = None
     fail_on: Severity = Severity.WARNING
 
 
@@ -89,6 +92,10 @@ class Watch:
         ]
         self._dialect = dialect
         self._contract = None if wishes.expect is None else read_contract(wishes.expect)
+        self._station = (
+            None if wishes.notify is None else Link(wishes.notify, Inbox(self.clock, room=0))
+        )
+        self._notifier = None if self._station is None else Notifier(self._station.send, dialect)
         self._stopped_by_finding = False
 
     def now(self) -> float:
@@ -101,6 +108,8 @@ class Watch:
             if self._contract is not None or output.wants_meaning:
                 each.learn_meaning(self._dialect, self._contract)
             each.line.start()
+        if self._station is not None:
+            self._station.start()
         began = time.monotonic()
         length_s = self._wishes.length_s
         with output, suppress(KeyboardInterrupt):
@@ -123,6 +132,8 @@ class Watch:
             said = each.tick(now)
             output.say(said)
             self._note(said)
+            if self._notifier is not None:
+                self._notifier.tell((e for e in said if isinstance(e, Change)), now)
         output.show(self.watched, now)
 
     def _note(self, said: Iterable[Change | Event]) -> None:
@@ -138,6 +149,8 @@ class Watch:
 
     def _end(self, output: Output) -> int:
         now = self.now()
+        if self._station is not None:
+            self._station.close()
         results, failed = [], False
         for each in self.watched:
             said, report, findings = each.finish(now)

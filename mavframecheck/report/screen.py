@@ -21,6 +21,8 @@ from mavframecheck.report.words import component, plural
 
 WIDE = 130
 """Columns from which streams stand beside the rest."""
+FEWEST_STREAMS = 6
+"""Lines that must be left for streams below the findings."""
 _BARS = "▁▂▃▄▅▆▇█"
 _STATES = {
     "up": "green",
@@ -28,6 +30,7 @@ _STATES = {
     "silent": "bold white on red",
     "closed": "bold white on red",
 }
+SILENT_S = 5.0
 _MOST_SENDERS = 5
 _EVENTS = 3
 
@@ -63,7 +66,7 @@ def _page(
     tail = _log(log, width)
     room = height - len(head) - len(tail)
     body = _findings(views, width, room)
-    if streams and room - len(body) > 3:
+    if streams and room - len(body) >= FEWEST_STREAMS:
         body += _streams(views, width, room - len(body))
     return _fitted([*head, *body], height - len(tail), width) + tail
 
@@ -114,14 +117,14 @@ def _verdict(views: Sequence[View]) -> tuple[str, str]:
 def _link(status: LinkStatus, width: int) -> Text:
     """Return a line about a link: state, rates, loss, garbage, recording."""
     parts = [f"{status.rate_hz:.0f} msg/s", f"{status.bytes_per_s / 1000:.1f} kB/s"]
-    if status.loss is not None:
+    if status.quiet_s is not None and status.state != "up":
+        parts = [f"last heard {_age(status.quiet_s)} ago, {plural(status.messages, 'message')}"]
+    elif status.loss is not None:
         parts.append(f"loss {status.loss:.1%}")
     if status.garbage_bytes:
         parts.append(f"{status.garbage_bytes} bytes garbage")
     if status.record_bytes is not None:
         parts.append(f"rec {status.record_bytes / 1e6:.1f} MB")
-    if status.quiet_s is not None and status.state != "up":
-        parts.append(f"last heard {_age(status.quiet_s)} ago")
     name = textwrap.shorten(sentence(status.link), max(20, width - 50), placeholder="...")
     return Text.assemble(
         (name, "bold"), " ", (status.state, _STATES[status.state]), "  ", ", ".join(parts)
@@ -139,17 +142,15 @@ def _senders(view: View, width: int) -> Iterator[Text]:
 
 def _sender(vehicle: Vehicle, status: SenderStatus, width: int) -> Text:
     who = textwrap.shorten(component(vehicle), max(12, width - 44), placeholder="...")
+    line = Text.assemble(f"  {vehicle.sysid}/{vehicle.compid}".ljust(10), who, "  ")
+    if status.quiet_s >= SILENT_S:
+        return line.append(f"silent for {_age(status.quiet_s)}", "bold red")
     parts = [f"{status.rate_hz:.0f}/s"]
     if status.loss is not None:
         parts.append(f"loss {status.loss:.1%}")
     if status.latency_s is not None:
         parts.append(f"late {status.latency_s * 1e3:.0f} ms")
-    line = Text.assemble(
-        f"  {vehicle.sysid}/{vehicle.compid}".ljust(10), who, "  ", (", ".join(parts), "dim")
-    )
-    if status.quiet_s >= 5:
-        line.append(f"  silent for {_age(status.quiet_s)}", "bold red")
-    return line
+    return line.append(", ".join(parts), "dim")
 
 
 def _places(places: Iterable[Place]) -> Iterator[Text]:
@@ -191,7 +192,7 @@ def _findings(views: Sequence[View], width: int, room: int) -> list[Text]:
         ]
     lines = [Text("")]
     for number, each in enumerate(standing):
-        block = _finding(each, width, full=each.active)
+        block = _finding(each, width)
         more = len(standing) - number - 1
         if len(lines) + len(block) + bool(more) > room:
             lines.append(Text(f"and {plural(more + 1, 'more finding')}", "dim"))
@@ -200,9 +201,10 @@ def _findings(views: Sequence[View], width: int, room: int) -> list[Text]:
     return lines
 
 
-def _finding(standing: Standing, width: int, *, full: bool) -> list[Text]:
-    """Return a finding: what, since when, how it looks, what to do; one that ended is a line."""
+def _finding(standing: Standing, width: int) -> list[Text]:
+    """Return a finding: what, since when, how it looks, what to do; information, or one that ended, is a line."""
     finding = standing.finding
+    full = standing.active and finding.severity is not Severity.INFO
     when = f"{finding.count}x, for {_age(standing.age_s)}"
     if not standing.active:
         when = f"{finding.count}x, last {_age(standing.last_s)} ago"

@@ -21,13 +21,16 @@ from pymavlink import mavutil
 from mavframecheck.cli import main
 from mavframecheck.cli.watching import Watch, Wishes
 from mavframecheck.engine import Settings
+from mavframecheck.engine.live.notify import COMPONENT
 from mavframecheck.model import Finding, Severity
+from mavframecheck.model.contract import Deviation
 from mavframecheck.model.live import Change, Event
 from mavframecheck.report import Checked
 from mavframecheck.sources.links import clock, link
+from mavframecheck.wire.encode import stamped
 from samples.make import HERE
 from tests.engine.judged import judge, shipped
-from tests.links import free_port, peer, records, wait_for
+from tests.links import PATIENCE_S, free_port, peer, records, wait_for
 from tests.strategies import DIALECT, frame
 
 SAMPLE = HERE / "degrees_in_scaled_field.tlog"
@@ -38,8 +41,11 @@ posix = pytest.mark.skipif(os.name != "posix", reason="signals and pseudo-termin
 class Heard:
     """Keeps what a watch says."""
 
+    wants_meaning = False
+
     def __init__(self) -> None:
         self.said: list[Change | Event] = []
+        self.differ: Sequence[Deviation] | None = None
         self.results: Sequence[Checked] = ()
 
     def say(self, said: Sequence[Change | Event]) -> None:
@@ -48,8 +54,8 @@ class Heard:
     def show(self, watched: Any, now: float) -> None:
         pass
 
-    def end(self, results: Sequence[Checked]) -> None:
-        self.results = results
+    def end(self, results: Sequence[Checked], differ: Sequence[Deviation] | None) -> None:
+        self.results, self.differ = results, differ
 
     def __enter__(self) -> Self:
         return self
@@ -377,6 +383,48 @@ def test_full_disk(port: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
         stage.sees(lambda: messages(stage) == 3)
     assert stage.end() == 2
     assert [data for _, data in records(path.read_bytes())] == [heartbeat()]
+
+
+def test_notify(port: int) -> None:
+    """The ground station gets findings as STATUSTEXT of a component of the system concerned."""
+    link, station = f"udpin:127.0.0.1:{port}", f"udpin:127.0.0.1:{free_port()}"
+    with (
+        peer(station) as ground,
+        process(link, "--notify", station.replace("in", "out", 1)) as running,
+        peer(f"udpout:{link[6:]}") as vehicle,
+    ):
+        heard(running, "open")
+        for _, data in records(SAMPLE.read_bytes()):
+            vehicle.write(data)
+        finding = heard(running, "found")["finding"]
+        told = ground.recv_match(type="STATUSTEXT", blocking=True, timeout=PATIENCE_S)
+        assert (told.get_srcSystem(), told.get_srcComponent()) == (finding["sysid"], COMPONENT)
+        assert told.text.startswith(finding["code"])
+        assert not vehicle.recv()
+
+
+def test_contract(port: int, tmp_path: Path) -> None:
+    """What a recording shows is kept by the same flight, and broken by one that lacks streams."""
+    made = CliRunner().invoke(main, ["inspect", "--contract", str(SAMPLE)])
+    path = tmp_path / "contract.toml"
+    path.write_text(made.stdout)
+    kept = differences(tmp_path, path, SAMPLE.read_bytes())
+    assert kept == []
+    without = [stamped(data, t_us) for t_us, data in records(SAMPLE.read_bytes()) if data[7] != 33]
+    broken = differences(tmp_path, path, b"".join(without))
+    assert [(each["what"], each["message"]) for each in broken] == [
+        ("missing", "GLOBAL_POSITION_INT")
+    ]
+
+
+def differences(folder: Path, contract: Path, data: bytes) -> list[dict[str, Any]]:
+    """Return how a tlog, followed, differs from a contract."""
+    path = folder / "followed.tlog"
+    path.write_bytes(data)
+    arguments = ["--follow", str(path), "--expect", str(contract), "--for", "0.5s"]
+    ended = CliRunner().invoke(main, ["watch", "--format", "jsonl", *arguments])
+    said = [json.loads(line) for line in ended.stdout.splitlines()]
+    return [each for each in said if each["type"] == "deviation"]
 
 
 # As a process

@@ -66,9 +66,10 @@ class News(NamedTuple):
 class Inbox:
     """What came over one link, and perhaps over its relay, in the order in which it came."""
 
-    def __init__(self, clock: Clock) -> None:
-        """Stamp what comes with the time of `clock`."""
+    def __init__(self, clock: Clock, room: int = MAX_WAITING) -> None:
+        """Stamp what comes with the time of `clock`; keep at most `room` bytes until they are taken."""
         self._clock = clock
+        self._room = room
         self._pieces: deque[Piece] = deque()
         self._lock = threading.Lock()
         self._waiting = 0
@@ -80,7 +81,7 @@ class Inbox:
         """Add bytes of `peer`, received now."""
         t_us = self._clock.now_us()
         with self._lock:
-            if self._waiting + len(data) > MAX_WAITING:
+            if self._waiting + len(data) > self._room:
                 self._dropped += len(data)
                 return
             if peer not in self._peers and len(self._peers) < MAX_PEERS:
