@@ -135,6 +135,8 @@ class Watch:
             if self._notifier is not None:
                 self._notifier.tell((e for e in said if isinstance(e, Change)), now)
         output.show(self.watched, now)
+        for each in self.watched:
+            each.session.ask()
 
     def _note(self, said: Iterable[Change | Event]) -> None:
         """Stop when a finding is bad enough."""

@@ -6,6 +6,7 @@ for markup. What does not fit is counted, never silently left out.
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -232,11 +233,15 @@ def _at_most(lines: list[str], most: int) -> list[str]:
 
 
 def bars(values: Sequence[float]) -> str:
-    """Return a sparkline from zero to the largest of `values`."""
-    top = max(values) or 1.0
-    return "".join(
-        _BARS[min(int(max(each, 0.0) / top * len(_BARS)), len(_BARS) - 1)] for each in values
-    )
+    """Return a sparkline from zero to the largest of `values`; a gap for what is no number."""
+    top = max((each for each in values if math.isfinite(each)), default=0.0) or 1.0
+    return "".join(_bar(each / top) for each in values)
+
+
+def _bar(share: float) -> str:
+    if not math.isfinite(share):
+        return " "
+    return _BARS[min(int(max(share, 0.0) * len(_BARS)), len(_BARS) - 1)]
 
 
 def _stream_page(views: Sequence[View], width: int, height: int) -> list[Text]:

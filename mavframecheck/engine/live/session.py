@@ -25,7 +25,7 @@ from mavframecheck.sources import Kind
 from mavframecheck.wire import Batch, Chunk, Dialect, whole
 
 ASK_S = 0.02
-"""Python checks are asked for so long (s) after a batch: one at least."""
+"""Python checks are asked for so long (s) at a time: one at least."""
 ASK_SHARE = 0.1
 """Asking takes at most this part of the time."""
 
@@ -91,12 +91,11 @@ class Session:
             self.now = float(np.max(times)) * 1e-6
 
     def changes(self) -> list[Change]:
-        """Return what is new about findings; a few of the Python checks are asked on the way."""
-        self._ask()
+        """Return what is new about findings since the last call."""
         return self._news.since(self.now or 0.0)
 
-    def _ask(self) -> None:
-        """Go on asking, or begin again when there was enough rest since the last time."""
+    def ask(self) -> None:
+        """Ask some Python checks, or none if the last round is not long ago; `changes` then tells."""
         began = now = self._timer()
         if now < self._rested_until or self.now is None:
             return
@@ -115,7 +114,3 @@ class Session:
         for batch in self._batches:
             self._judge(batch)
         return summed_up(self.reading, self.runner)
-
-    def last_changes(self) -> list[Change]:
-        """Return what `finish` added to the findings or took away."""
-        return self._news.since(self.now or 0.0)

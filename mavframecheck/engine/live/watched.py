@@ -78,4 +78,4 @@ class Watched:
         if self._meaning is not None:
             self._meaning.look(now)
             self._compare()
-        return [*self.pulse.events(now), *self.session.last_changes()], report, findings
+        return [*self.pulse.events(now), *self.session.changes()], report, findings

@@ -36,9 +36,10 @@ def live(pieces: Iterable[bytes], pack: Pack | None = None) -> tuple[Result, lis
     changes = []
     for piece in pieces:
         session.take(piece)
+        session.ask()
         changes += session.changes()
     result = session.finish()
-    return result, changes + session.last_changes()
+    return result, changes + session.changes()
 
 
 def standing(changes: list[Change]) -> list[tuple[str, str]]:
