@@ -195,7 +195,7 @@ class Runner:
                 badness[rows_found] = np.nan_to_num(worst[found])
         self._tallies[rule.rule.code].checked += int(np.count_nonzero(looked))
         if hit.any() or (
-            looked.any() and self._episodes.follows(rule.rule.code, rows.table.name, label)
+            looked.any() and self.episodes.follows(rule.rule.code, rows.table.name, label)
         ):
             self._collect(rule, label, bindings, rows, looked, hit, badness, by)
         return looked
