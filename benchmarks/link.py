@@ -233,7 +233,7 @@ def main() -> int:
     memory, took, messages = an_hour(path, chosen.hours)
     table = Table("figure", "measured", "required", "met")
     p50, p99 = np.percentile(late, [50, 99]) * 1e3
-    early = max(mb for hours, mb in memory if hours <= chosen.hours / 3)
+    early = max(mb for _, mb in memory[: max(1, len(memory) // 3)])
     grown = memory[-1][1] - early
     load = messages / sum(took)
     rows = [

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import signal
-import sys
 import time
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Self
 
 import click
 
@@ -35,8 +35,6 @@ CLEAN, FINDINGS, FAILED, NOTHING = 0, 1, 2, 3
 TICK_S = 0.1
 REST_S = 0.005
 """At least so long (s) the threads that read links have the interpreter to themselves."""
-SWITCH_S = 0.001
-"""A thread that reads a link waits so long (s) for the interpreter, instead of five times as long."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +54,6 @@ class Wishes:
 
 def watched(wishes: Wishes, pack: Pack, settings: Settings, *, form: str) -> int:
     """Watch as the user wishes, and return the exit code."""
-    sys.setswitchinterval(SWITCH_S)
-    signal.signal(signal.SIGTERM, _interrupted)
     try:
         watch = Watch(wishes, pack, settings, load_dialect(settings.dialect))
         return watch.run(output_for(form))
@@ -68,8 +64,26 @@ def watched(wishes: Wishes, pack: Pack, settings: Settings, *, form: str) -> int
         return FAILED
 
 
-def _interrupted(_signal: int, _frame: object) -> None:
-    raise KeyboardInterrupt
+class _Signals:
+    """Lets Ctrl-C and SIGTERM end the watch between two batches, never within one; a second one at once."""
+
+    def __init__(self) -> None:
+        self.ended = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._before[number] = signal.signal(number, self._end)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _end(self, _signal: int, _frame: object) -> None:
+        if self.ended:
+            raise KeyboardInterrupt
+        self.ended = True
 
 
 class Watch:
@@ -110,16 +124,21 @@ class Watch:
             each.line.start()
         if self._station is not None:
             self._station.start()
+        with _Signals() as signals:
+            with output:
+                self._watch(output, signals)
+            return self._end(output)
+
+    def _watch(self, output: Output, signals: _Signals) -> None:
+        """Go from batch to batch until the end."""
         began = time.monotonic()
-        length_s = self._wishes.length_s
-        with output, suppress(KeyboardInterrupt):
-            while not self._stopped_by_finding:
-                tick = time.monotonic()
-                if length_s is not None and tick - began >= length_s:
-                    break
-                self.tick(output)
-                time.sleep(max(REST_S, TICK_S - (time.monotonic() - tick)))
-        return self._end(output)
+        length_s = math.inf if self._wishes.length_s is None else self._wishes.length_s
+        while not (self._stopped_by_finding or signals.ended):
+            tick = time.monotonic()
+            if tick - began >= length_s:
+                return
+            self.tick(output)
+            time.sleep(max(REST_S, TICK_S - (time.monotonic() - tick)))
 
     def tick(self, output: Output) -> None:
         """Take in what came on every link, and tell."""
