@@ -34,6 +34,7 @@ _STATES = {
 SILENT_S = 5.0
 _MOST_SENDERS = 5
 _EVENTS = 3
+"""Events shown at least."""
 
 
 def screen(
@@ -64,7 +65,7 @@ def _page(
     for view in views:
         head += [_link(view.status, width), *_senders(view, width), *_places(view.places)]
         head += _contract(view)
-    tail = _log(log, width)
+    tail = _log(log, width, max(_EVENTS, height // 7))
     room = height - len(head) - len(tail)
     body = _findings(views, width, room)
     if streams and room - len(body) >= FEWEST_STREAMS:
@@ -288,9 +289,9 @@ def _cut(text: str, width: int) -> str:
     return text if len(text) < width else f"{text[: width - 3]}.."
 
 
-def _log(log: Sequence[Change | Event], width: int) -> list[Text]:
+def _log(log: Sequence[Change | Event], width: int, most: int) -> list[Text]:
     """Return the last events, below a line."""
-    events = [each for each in log if isinstance(each, Event)][-_EVENTS:]
+    events = [each for each in log if isinstance(each, Event)][-most:]
     lines = [Text("─" * width, "dim")] if events else []
     for each in events:
         lines.append(Text(f"{clock(each.time)} {sentence(each.text)}", "dim"))
