@@ -93,16 +93,13 @@ class Watch:
         """Make ready to watch; SourceError when a link is none or a file cannot be used."""
         self._wishes = wishes
         self.clock = Clock()
-        lines = [*_links(wishes, dialect, self.clock), *map(FileLine, wishes.files)]
-        names = _recordings(wishes.record, len(lines))
+        links = [LinkLine(link, wishes.relay, dialect, self.clock) for link in wishes.links]
+        lines: list[Line] = [*links, *map(FileLine, wishes.files)]
+        self._records = _recordings(wishes.record, len(lines))
+        files = [str(path or line.name) for line, path in zip(lines, self._records)]
         self.watched = [
-            _watched(
-                line,
-                name,
-                Session(line.name, str(name or line.name), pack, settings, dialect),
-                self.now(),
-            )
-            for line, name in zip(lines, names)
+            Watched(line, Session(line.name, file, pack, settings, dialect), self.now())
+            for line, file in zip(lines, files)
         ]
         self._dialect = dialect
         self._contract = None if wishes.expect is None else read_contract(wishes.expect)
@@ -118,16 +115,26 @@ class Watch:
 
     def run(self, output: Output) -> int:
         """Watch until the end, telling `output`; return the exit code."""
-        for each in self.watched:
-            if self._contract is not None or output.wants_meaning:
-                each.learn_meaning(self._dialect, self._contract)
-            each.line.start()
-        if self._station is not None:
-            self._station.start()
+        self.start(meaning=output.wants_meaning)
         with _Signals() as signals:
             with output:
                 self._watch(output, signals)
             return self._end(output)
+
+    def start(self, *, meaning: bool) -> None:
+        """Open links and files; `meaning`: find out what every stream means, as a contract needs it too.
+
+        Raises SourceError when a port cannot be had or a file cannot be made.
+        """
+        for each in self.watched:
+            if meaning or self._contract is not None:
+                each.learn_meaning(self._dialect, self._contract)
+            each.line.start()
+        if self._station is not None:
+            self._station.start()
+        for each, path in zip(self.watched, self._records):
+            if path is not None:
+                each.record(Recorder(path))
 
     def _watch(self, output: Output, signals: _Signals) -> None:
         """Go from batch to batch until the end."""
@@ -163,7 +170,7 @@ class Watch:
         if exit_on is not None:
             self._stopped_by_finding |= any(
                 isinstance(each, Change)
-                and each.what in ("found", "updated")
+                and each.what in ("found", "worse")
                 and each.finding.severity.rank >= exit_on.rank
                 for each in said
             )
@@ -193,17 +200,8 @@ class Watch:
         return FINDINGS if worst >= self._wishes.fail_on.rank else CLEAN
 
 
-def _links(wishes: Wishes, dialect: Dialect, clock: Clock) -> list[Line]:
-    return [LinkLine(link, wishes.relay, dialect, clock) for link in wishes.links]
-
-
 def _recordings(path: Path | None, count: int) -> list[Path | None]:
     """Return the file to record each of `count` links to: several get a number each."""
     if path is None or count == 1:
         return [path] * count
     return [path.with_stem(f"{path.stem}-{number}") for number in range(1, count + 1)]
-
-
-def _watched(line: Line, record: Path | None, session: Session, now: float) -> Watched:
-    recorder = None if record is None else Recorder(record)
-    return Watched(line, session, recorder, now)

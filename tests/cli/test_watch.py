@@ -80,8 +80,7 @@ class Stage:
         monkeypatch.setattr(clock.Clock, "jump_s", lambda _: self.jump_s)
         self.heard = Heard()
         self.watch = Watch(Wishes(links=links, **wishes), shipped(), Settings(), DIALECT)
-        for each in self.watch.watched:
-            each.line.start()
+        self.watch.start(meaning=False)
 
     def tick(self, seconds: float = 0.0) -> None:
         """Let time pass and see what came."""
@@ -518,15 +517,18 @@ def test_usage(arguments: list[str], words: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_port_in_use() -> None:
+def test_port_in_use(tmp_path: Path) -> None:
     """A port that another program has (pymavlink does not close the socket that it cannot bind)."""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        result = CliRunner().invoke(main, ["watch", f"tcpin:127.0.0.1:{port}"])
+        path = tmp_path / "seen.tlog"
+        arguments = [f"tcpin:127.0.0.1:{port}", "--record", str(path)]
+        result = CliRunner().invoke(main, ["watch", *arguments])
     assert result.exit_code == 2
     assert "choose another port" in result.stderr
+    assert not path.exists()
 
 
 def test_record_keeps_what_is_there(tmp_path: Path) -> None:

@@ -17,8 +17,8 @@ from mavframecheck.wire import Dialect
 class Watched:
     """One link under watch."""
 
-    def __init__(self, line: Line, session: Session, recorder: Recorder | None, now: float) -> None:
-        """Watch `line` from `now` on (s since 1970), judge it in `session`, write it to `recorder`."""
+    def __init__(self, line: Line, session: Session, now: float) -> None:
+        """Watch `line` from `now` on (s since 1970), and judge it in `session`."""
         self.line = line
         self.session = session
         self.pulse = Pulse(line.name, now)
@@ -28,8 +28,12 @@ class Watched:
         """Where they differ from the contract; None without one."""
         self._contract: Contract | None = None
         self._meaning: Meaning | None = None
-        self._recorder = recorder
+        self._recorder: Recorder | None = None
         self.recording_failed = False
+
+    def record(self, recorder: Recorder) -> None:
+        """From now on, write down what comes."""
+        self._recorder = recorder
 
     def learn_meaning(self, dialect: Dialect, contract: Contract | None) -> None:
         """From now on, find out what every stream means, and compare it with a contract."""

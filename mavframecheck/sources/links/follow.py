@@ -33,6 +33,7 @@ class Follower:
             why = REFUSALS.get(
                 kind, "is not a tlog: only those can be followed; give it to 'check'"
             )
+            self._file.close()
             raise SourceError(f"{self.name}: this {why}")
         self._file.seek(0)
 

@@ -31,7 +31,7 @@ MAX_WAITING = 64 * 1024 * 1024
 _BUFFER = 4 * 1024 * 1024
 _DATAGRAM = 65535
 _NETWORK = re.compile(r"(udpin|udpout|tcp|tcpin):([^:]+):(\d{1,5})")
-_SERIAL = re.compile(r"(/dev/.+|COM\d+)", re.IGNORECASE)
+_SERIAL = re.compile(r"(/dev/.+|COM\d+(,\d+)?)", re.IGNORECASE)
 _FORMS = (
     "a link is udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT, "
     "or a serial port with its speed, such as /dev/ttyUSB0,57600 or COM3,57600"
