@@ -241,7 +241,7 @@ def test_clock_of_this_computer(port: int, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_vehicle_comes_and_goes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A TCP server that is not there yet, closes, and returns."""
+    """A TCP server that is not there yet, closes, and returns (a port that closes may still take a call)."""
     monkeypatch.setattr(link, "RETRY_S", 0.01)
     port = free_port(socket.SOCK_STREAM)
     stage = Stage(monkeypatch, f"tcp:127.0.0.1:{port}")
@@ -253,7 +253,7 @@ def test_vehicle_comes_and_goes(monkeypatch: pytest.MonkeyPatch) -> None:
             stage.tick()
             stage.sees(functools.partial(counted, stage, 0, number + 1))
         stage.sees(functools.partial(closed, stage, number + 2))
-    assert stage.heard.events().count("open") == 2
+    assert stage.heard.events().count("open") >= 2
     assert stage.end() == 0
 
 
