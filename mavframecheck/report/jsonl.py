@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 
 import msgspec
 
-
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.escape import json_text
 from mavframecheck.report.plain import plain
