@@ -8,7 +8,7 @@ CORPUS ?= ../shared/corpus
 BASELINE ?= build/corpus-baseline.jsonl
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test fuzz check generate docs samples bench accuracy injection corpus-frames corpus-diff clean
+.PHONY: help demo test fuzz check generate docs samples bench bench-link accuracy injection corpus-frames corpus-diff clean
 
 help:  ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -54,6 +54,9 @@ samples: $(READY)  ## write samples/ again
 
 bench: $(READY)  ## speed and memory against the required figures (about five minutes)
 	$(BIN)/python -m benchmarks.bench --corpus $(CORPUS)
+
+bench-link: $(READY)  ## a live link: latency, load, memory over an hour of flight (about three minutes)
+	$(BIN)/python -m benchmarks.link --corpus $(CORPUS)
 
 accuracy: $(READY)  ## labelled recordings: found, missed, false alarms; real ones: confirmed or not
 	$(BIN)/python -m benchmarks.accuracy --corpus $(CORPUS)

@@ -14,6 +14,7 @@ import click
 
 COMMANDS = {
     "check": "Judge recordings and missions; exit 1 on findings.",
+    "watch": "Judge links to vehicles while they are up.",
     "inspect": "Show what the numbers of a recording mean: the map of its streams.",
     "rules": "List the rules.",
     "rule": "Explain one rule.",

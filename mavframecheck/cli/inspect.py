@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mavframecheck.cli.clocks import ClockTable
+from mavframecheck.cli.contract import ContractText
 from mavframecheck.cli.options import dialect_option, input_kind_option
 from mavframecheck.cli.output import echo, page_context
 from mavframecheck.cli.positions import FORMATS, Positions, Wish, position_options
@@ -63,6 +64,11 @@ _PIPE_WIDTH = 100
     callback=parse_sender,
     help="Say how this sender of poses or positions does in each step of integrating a sensor.",
 )
+@click.option(
+    "--contract",
+    is_flag=True,
+    help="Write what is sent, in which frames and how often, as a contract for 'watch --expect'.",
+)
 @position_options
 @dialect_option
 @input_kind_option
@@ -77,6 +83,7 @@ def inspect(
     origins: bool,
     clocks: bool,
     sender: int | None,
+    contract: bool,
     dialect: str,
     input_kind: str | None,
     wish: Wish | None,
@@ -87,15 +94,22 @@ def inspect(
     field its unit, frame, direction, height reference, clock, range and how much of it is missing.
     With --positions: every position as a record instead. With --origins: where positions count from. With --clocks: the clock behind each stamp.
     With --sender: axes, signs, scale, rotation, clock, delay, covariance, lever arm, resets and rate of one sender.
+    With --contract: a contract for 'watch --expect'.
 
     Exit codes: 0 done, 2 wrong usage or a file that cannot be read, 3 nothing could be decoded.
     """
     from mavframecheck.engine import Settings
 
     settings = Settings(dialect=dialect, input_kind=input_kind, sender=sender)
-    wanted = {"origins": origins, "clocks": clocks, "sender": sender is not None}
+    wanted = {
+        "origins": origins,
+        "clocks": clocks,
+        "sender": sender is not None,
+        "contract": contract,
+    }
     if (wish is not None) + sum(wanted.values()) > 1:
-        raise click.UsageError("choose one of --positions, --origins, --clocks and --sender")
+        views = ", ".join(f"--{view}" for view in wanted)
+        raise click.UsageError(f"choose one of --positions, {views}")
     if wish is not None:
         exporter = Positions(settings, _known(messages, dialect), wish)
         ctx.exit(exporter.show(paths, form or "csv"))
@@ -167,11 +181,12 @@ class _Origins:
         return found, found.messages
 
 
-VIEWS: dict[str, type[_Map | _Origins | ClockTable | Integration]] = {
+VIEWS: dict[str, type[_Map | _Origins | ClockTable | Integration | ContractText]] = {
     "map": _Map,
     "origins": _Origins,
     "clocks": ClockTable,
     "sender": Integration,
+    "contract": ContractText,
 }
 """What `inspect` can show of a recording, by name."""
 

@@ -45,6 +45,11 @@ def check_recording(
     runner = Runner(recording.name, rules, reading.context, dialect, only=settings.sender)
     for batch in reading.batches(progress):
         runner.update(batch)
+    return summed_up(reading, runner)
+
+
+def summed_up(reading: Reading, runner: Runner) -> tuple[FileReport, tuple[Finding, ...]]:
+    """Return the report and the findings of a recording that is read to its end."""
     findings, runs = runner.finish()
     report = FileReport(
         **reading.summary(),

@@ -6,7 +6,8 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import NamedTuple
+from itertools import chain
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,8 @@ GAP_US = 10_000_000
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
+Key: TypeAlias = tuple[str | int | None, ...]
+"""Names an episode among all of a recording."""
 Locate = Callable[[int, str | None], MissionLocation]
 """Says where in a mission file a frame number, and a field of it, stand."""
 
@@ -117,7 +120,7 @@ class Episodes:
         self._file = file
         self._locate = locate
         self._streams: dict[tuple[str, str, str | None], dict[int, _Stream]] = {}
-        self._observed: list[Episode] = []
+        self._observed: dict[str, list[Episode]] = {}
 
     def follows(self, code: str, message: str, label: str | None) -> bool:
         """Return whether a rule has had hits on a message, so that rows without one matter too."""
@@ -138,18 +141,34 @@ class Episodes:
             if episodes is not None:
                 _extend(episodes, rule, judged, places)
 
-    def observe(self, episode: Episode) -> None:
-        """Add an episode that a Python check put together itself."""
-        self._observed.append(episode)
+    def observe(self, code: str, episodes: list[Episode]) -> None:
+        """Take the episodes that the Python check of a rule put together, instead of those before."""
+        self._observed[code] = episodes
+
+    def lasting(self) -> dict[Key, Episode]:
+        """Return the episodes that last; one that goes on keeps its key."""
+        collected = (
+            ((*group, stream, e.first.number), e)
+            for group, streams in self._streams.items()
+            for stream, each in streams.items()
+            for e in each.episodes
+        )
+        observed = (
+            ((code, str(e.subject), place), e)
+            for code, episodes in self._observed.items()
+            for place, e in enumerate(episodes)
+        )
+        return {key: e for key, e in chain(collected, observed) if e.lasts}
 
     def findings(self) -> list[Finding]:
         """Return the findings of all episodes that last, in order of their first frame."""
-        collected = [
-            e for group in self._streams.values() for s in group.values() for e in s.episodes
-        ]
-        lasting = [e for e in (*collected, *self._observed) if e.lasts]
+        lasting = list(self.lasting().values())
         lasting.sort(key=lambda e: (e.first.number, e.rule.rule.code, str(e.subject)))
-        return [_finding(e, self._file, self._locate) for e in lasting]
+        return [self.finding(e) for e in lasting]
+
+    def finding(self, episode: Episode) -> Finding:
+        """Return an episode as a finding."""
+        return _finding(episode, self._file, self._locate)
 
 
 def _extend(stream: _Stream, rule: CompiledRule, judged: Judged, places: Ints) -> None:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
 from mavframecheck.engine.settings import Settings
 from mavframecheck.model import Damage, Vehicle
 from mavframecheck.semantics.names import type_name
-from mavframecheck.sources import Recording
+from mavframecheck.sources import Kind
 from mavframecheck.vehicle import Context, Traffic
 from mavframecheck.vehicle.roles import version_text
 from mavframecheck.vehicle.traffic import MAX_SENDERS, MAX_STREAMS
-from mavframecheck.wire import Batch, Dialect, Ranges, read_batches
+from mavframecheck.wire import Batch, Chunk, Dialect, Ranges, read_batches
 
 MAX_DAMAGE = 100
 """Damaged ranges that a report lists; all are counted."""
@@ -22,10 +22,33 @@ MAX_DAMAGE = 100
 Progress = Callable[[int], None]
 
 
+class Readable(Protocol):
+    """What can be read: an open file, or a link."""
+
+    @property
+    def name(self) -> str:
+        """What findings call it."""
+
+    @property
+    def kind(self) -> Kind:
+        """What its bytes are."""
+
+    @property
+    def stamped(self) -> bool:
+        """Whether a receive time precedes each frame in the bytes."""
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What was damaged or left out."""
+
+    def chunks(self) -> Iterator[list[Chunk]]:
+        """Yield one batch after another: a chunk for every flow that has bytes in it."""
+
+
 class Reading:
     """A recording on its way through: its batches, its context, and what was counted."""
 
-    def __init__(self, recording: Recording, settings: Settings, dialect: Dialect) -> None:
+    def __init__(self, recording: Readable, settings: Settings, dialect: Dialect) -> None:
         """Read `recording` with `dialect`, assuming what `settings` say."""
         self.context = Context(settings.autopilot)
         self.traffic = Traffic(dialect)

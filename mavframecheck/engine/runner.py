@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -105,7 +106,9 @@ class Runner:
             check.only = only
         self._only = only
         self._context = context
-        self._episodes = Episodes(file, upload.locate if upload is not None else None)
+        self._dialect = dialect
+        self.episodes = Episodes(file, upload.locate if upload is not None else None)
+        """What was found so far; of the Python checks, what they said when they were last asked."""
         self._judged = None if upload is None else {ITEM}
         self._halls: dict[str, list[_Hall]] = {}
         self._tallies = {rule.rule.code: _Tally() for rule in self._rules}
@@ -133,11 +136,29 @@ class Runner:
             self._judge_ready(desk, desk.queue.close())
         runs = [self._run_of(rule) for rule in self._rules]
         for rule, check in self._checks:
-            for observation in check.finish():
-                if self._concerns(observation.subject):
-                    self._episodes.observe(_episode(rule, observation))
+            self._observe(rule, check)
             runs.append(_verdict_of(rule, check))
-        return self._episodes.findings(), sorted(runs, key=lambda run: run.code)
+        return self.episodes.findings(), sorted(runs, key=lambda run: run.code)
+
+    @property
+    def judging(self) -> int:
+        """Rules with an expression that had something to judge so far."""
+        return sum(tally.checked > 0 for tally in self._tallies.values())
+
+    def ask(self) -> Iterator[None]:
+        """Let each Python check say, one at a step, what it would if the recording ended here.
+
+        `episodes` then holds it. Copies answer, so that asking changes nothing of what comes later.
+        """
+        shared = {id(each): each for each in (self._context, self._dialect)}
+        copies = copy.deepcopy([check for _, check in self._checks], shared)
+        for (rule, _), check in zip(self._checks, copies):
+            self._observe(rule, check)
+            yield
+
+    def _observe(self, rule: CompiledRule, check: Check) -> None:
+        observed = [each for each in check.finish() if self._concerns(each.subject)]
+        self.episodes.observe(rule.rule.code, [_episode(rule, each) for each in observed])
 
     def _concerns(self, subject: Subject) -> bool:
         """Return whether a finding is about a sender that is judged."""
@@ -201,7 +222,7 @@ class Runner:
                 badness[rows_found] = np.nan_to_num(worst[found])
         self._tallies[rule.rule.code].checked += int(np.count_nonzero(looked))
         if hit.any() or (
-            looked.any() and self._episodes.follows(rule.rule.code, rows.table.name, label)
+            looked.any() and self.episodes.follows(rule.rule.code, rows.table.name, label)
         ):
             self._collect(rule, label, bindings, rows, looked, hit, badness, by)
         return looked
@@ -237,7 +258,7 @@ class Runner:
             subject,
             describe,
         )
-        self._episodes.collect(rule, rows.table.name, label, judged)
+        self.episodes.collect(rule, rows.table.name, label, judged)
 
     def _judge_ready(self, desk: _Desk, rows: Rows | None) -> None:
         """Judge rows; where context never came, those that a rule can judge without. Count the others."""

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 
 import msgspec
 
-from mavframecheck.model import FileReport, Finding, Suppressed
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.escape import json_text
 from mavframecheck.report.plain import plain
@@ -16,11 +15,12 @@ def render(results: Iterable[Checked], _context: Context) -> Iterator[bytes]:
     """Yield the findings of each file, then the file: whoever reads it knows all came before."""
     for checked in results:
         for finding in checked.findings:
-            yield _line("finding", finding)
+            yield line("finding", finding)
         for suppressed in checked.suppressed:
-            yield _line("suppressed", suppressed)
-        yield _line("file", checked.file)
+            yield line("suppressed", suppressed)
+        yield line("file", checked.file)
 
 
-def _line(kind: str, value: Finding | FileReport | Suppressed) -> bytes:
+def line(kind: str, value: msgspec.Struct) -> bytes:
+    """Return a struct as a line, with its `kind` under ``type``."""
     return json_text(msgspec.json.encode({"type": kind, **plain(value)})) + b"\n"

@@ -1,6 +1,6 @@
 """Bytes to frames to columns."""
 
-from mavframecheck.wire.batch import Batch, read_batches
+from mavframecheck.wire.batch import Batch, batch_of, read_batches
 from mavframecheck.wire.chunk import Chunk, whole
 from mavframecheck.wire.damage import Ranges
 from mavframecheck.wire.dialect import (
@@ -27,6 +27,7 @@ __all__ = [
     "Ranges",
     "Table",
     "Tables",
+    "batch_of",
     "load_dialect",
     "read_batches",
     "whole",

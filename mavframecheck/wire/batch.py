@@ -51,7 +51,7 @@ class Batch:
         self.tables = Tables(np.frombuffer(self.buffer, np.uint8), self.frames, self.layouts, rows)
 
 
-def _of_scans(scans: list[Scan], dialect: Dialect, first: int = 0, clock_us: int = 0) -> Batch:
+def batch_of(scans: list[Scan], dialect: Dialect, first: int = 0, clock_us: int = 0) -> Batch:
     """Put the `scans` of all flows in order; `first` and `clock_us` go on from the batch before."""
     buffer, frames = _merge(scans)
     frames.number = np.arange(first, first + len(frames))
@@ -110,10 +110,10 @@ def read_batches(
         for chunk in group:
             framer = framers.setdefault(chunk.flow, Framer(dialect, stamped=stamped))
             scans.append(framer.feed(chunk))
-        batch = _of_scans(scans, dialect, first, clock_us)
+        batch = batch_of(scans, dialect, first, clock_us)
         first += len(batch)
         clock_us = int(batch.frames.clock_us[-1]) if len(batch) else clock_us
         yield batch
     if framers:
         scans = [framer.feed(None) for framer in framers.values()]
-        yield _of_scans(scans, dialect, first, clock_us)
+        yield batch_of(scans, dialect, first, clock_us)

@@ -127,7 +127,10 @@ def test_the_library_gives_what_the_command_writes() -> None:
     ("options", "words"),
     [
         (("--as", "ned"), "go with --positions"),
-        (("--positions", "--clocks"), "choose one of --positions, --origins and --clocks"),
+        (
+            ("--positions", "--clocks"),
+            "choose one of --positions, --origins, --clocks, --sender, --contract",
+        ),
         (("--format", "csv"), "--format csv goes with --positions"),
         (("--positions", "--format", "text"), "positions are written as csv, jsonl, parquet"),
         (("--positions", "--origin", "1,2,3,msl"), "--origin is for --as ned and --as enu"),

@@ -1,0 +1,1 @@
+"""Links to vehicles: where live bytes come from, and the tlog they are recorded in."""
