@@ -462,6 +462,12 @@ SAMPLES = (
         "One corner with longitude first, latitude second.",
         missions.waypoints(missions.swapped),
     ),
+    Sample(
+        "far_corner.waypoints",
+        ("MFC901",),
+        "A digit of one latitude is wrong: two legs of 133 km.",
+        missions.waypoints(missions.far_corner),
+    ),
 )  # fmt: skip
 
 

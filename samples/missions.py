@@ -105,6 +105,11 @@ def sea_level_height(rows: list[Row]) -> None:
     rows[2]["alt"] = HOME_MSL + HEIGHT_M
 
 
+def far_corner(rows: list[Row]) -> None:
+    """Lose a digit of one corner's latitude: it is 133 km to the south."""
+    rows[3]["lat"] = round(rows[3]["lat"] - 1.2, 7)
+
+
 def swapped(rows: list[Row]) -> None:
     """Write longitude before latitude at one corner."""
     rows[2]["lat"], rows[2]["lon"] = rows[2]["lon"], rows[2]["lat"]

@@ -13,17 +13,21 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import repeat
 from pathlib import Path
+from typing import TypeVar
 
 from benchmarks.corpus import arguments, is_absent
+from benchmarks.injection.files import judge_files
 from benchmarks.injection.judge import FAMILIES, Outcome, Verdicts, judge_variant, known_rules
 from benchmarks.injection.motion import Motions, is_reported, judge_recording, recordings
 from benchmarks.injection.motion_table import show_motion
-from benchmarks.injection.plan import Mistake, Plan, read_plan
+from benchmarks.injection.plan import FileMistake, Mistake, Plan, read_plan
+
+Some = TypeVar("Some", Mistake, FileMistake)
 
 REQUIRED_RECALL = 0.99
 """Of the cases of each mistake in which the method can decide."""
@@ -42,14 +46,15 @@ def options() -> argparse.Namespace:
     parser.add_argument("--full", action="store_true", help="motion: every case (an hour and more)")
     parser.add_argument("--recording", nargs="*", default=[], help="beginnings of names")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
+    parser.add_argument("--files", action="store_true", help="mission files alone")
     parser.add_argument("--all", action="store_true", help="print every case")
     return parser.parse_args()
 
 
-def chosen(plan: Plan, only: list[str]) -> list[Mistake]:
+def chosen(mistakes: Iterable[Some], only: list[str]) -> list[Some]:
     """Return the mistakes that a code on the command line answers, all without one."""
     starts = tuple(only) or ("",)
-    return [m for m in plan.mistake if any(code.startswith(starts) for code in m.codes)]
+    return [m for m in mistakes if any(code.startswith(starts) for code in m.codes)]
 
 
 def variants(plan: Plan, names: list[str]) -> Iterator[tuple[str, str]]:
@@ -59,7 +64,9 @@ def variants(plan: Plan, names: list[str]) -> Iterator[tuple[str, str]]:
             yield from ((source.name, place) for place in (("",) * source.here + source.places))
 
 
-def show_mistake(mistake: Mistake, outcomes: list[Outcome], *, everything: bool) -> None:
+def show_mistake(
+    mistake: Mistake | FileMistake, outcomes: list[Outcome], *, everything: bool
+) -> None:
     """Print how one mistake fared, and where it was missed or wrongly found."""
     words = counted(outcomes)
     rows = sum(outcome.rows for outcome in outcomes if outcome.word == "found")
@@ -74,7 +81,9 @@ def show_mistake(mistake: Mistake, outcomes: list[Outcome], *, everything: bool)
                 print(f"      {outcome.text}")
 
 
-def show(plan: Plan, mistakes: list[Mistake], verdicts: Verdicts, *, everything: bool) -> bool:
+def show(
+    plan: Plan, mistakes: Sequence[Mistake | FileMistake], verdicts: Verdicts, *, everything: bool
+) -> bool:
     """Print the table and the totals; return whether all is as it must be."""
     outcomes: dict[str, list[Outcome]] = defaultdict(list)
     for outcome in verdicts.outcomes:
@@ -109,10 +118,13 @@ def recall(words: Counter[str]) -> float:
     return words["found"] / decided if decided else 1.0
 
 
-def show_gaps(plan: Plan, mistakes: list[Mistake], outcomes: dict[str, list[Outcome]]) -> None:
+def show_gaps(
+    plan: Plan, mistakes: Sequence[Mistake | FileMistake], outcomes: dict[str, list[Outcome]]
+) -> None:
     """Print what was not measured: rules to come, rules without a mistake, mistakes without a case."""
     built = {rule.code for rule, _ in known_rules()}
-    answered = {code for mistake in plan.mistake for code in mistake.codes}
+    every: list[Mistake | FileMistake] = [*plan.mistake, *plan.file_mistake]
+    answered = {code for mistake in every for code in mistake.codes}
     bare = {c for c in built - answered if c.startswith(FAMILIES)} - set(plan.unmeasured)
     print(f"No rule yet: {' '.join(sorted(answered - built)) or 'none'}")
     print(f"Rules without a mistake here: {' '.join(sorted(bare)) or 'none'}")
@@ -120,9 +132,15 @@ def show_gaps(plan: Plan, mistakes: list[Mistake], outcomes: dict[str, list[Outc
     print(f"Mistakes without a case: {'; '.join(empty) or 'none'}")
 
 
+def measure_files(plan: Plan, asked: argparse.Namespace) -> bool:
+    """Write every mistake into mission files; return whether all is as it must be."""
+    mistakes = chosen(plan.file_mistake, asked.only)
+    return show(plan, mistakes, judge_files(plan, mistakes), everything=asked.all)
+
+
 def measure_mistakes(plan: Plan, folder: Path, asked: argparse.Namespace) -> bool:
     """Run every mistake on every variant; return whether all is as it must be."""
-    mistakes = chosen(plan, asked.only)
+    mistakes = chosen(plan.mistake, asked.only)
     codes = tuple(asked.only) or FAMILIES
     jobs = list(variants(plan, asked.recording))
     verdicts = Verdicts()
@@ -150,12 +168,14 @@ def main() -> int:
     """Run what was asked for; 1 when a recall is short, or where there should be silence."""
     asked = options()
     folder: Path = asked.corpus / "sitl"
-    if is_absent(folder):
-        return 0
     plan = read_plan()
     good = True
     if asked.only != ["motion"]:
-        good = measure_mistakes(plan, folder, asked)
+        good = measure_files(plan, asked)
+    if asked.files or is_absent(folder):
+        return int(not good)
+    if asked.only != ["motion"]:
+        good &= measure_mistakes(plan, folder, asked)
     if asked.only in ([], ["motion"]):
         good &= measure_motion(plan, folder, asked)
     return int(not good)

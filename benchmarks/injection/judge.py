@@ -20,7 +20,7 @@ from mavframecheck.model import Finding, Rule
 from mavframecheck.sources import Recording
 from mavframecheck.wire import load_dialect
 
-FAMILIES = ("MFC1", "MFC2", "MFC3", "MFC408", "MFC6")
+FAMILIES = ("MFC1", "MFC2", "MFC3", "MFC408", "MFC416", "MFC6", "MFC707", "MFC9")
 """Beginnings of the codes that are measured."""
 LOUD = ("error", "warning")
 
@@ -141,6 +141,6 @@ def _answers(made: Made, mistake: Mistake, before: list[Finding]) -> tuple[int, 
 def _is_about(finding: Finding, mistake: Mistake) -> bool:
     """Return whether a finding is about the message that holds the mistake."""
     own = finding.compid == AUTOPILOT
-    by_autopilot = mistake.by == "autopilot" and not mistake.about
+    by_autopilot = (mistake.about_by if mistake.about else mistake.by) == "autopilot"
     message = mistake.about or mistake.message
     return finding.message_name in (message, None) and own == by_autopilot

@@ -69,7 +69,9 @@ class Mistake(_Part, frozen=True):
     by: Literal["input", "autopilot"] = "input"
     """Whose messages: those sent to the autopilot, or its own."""
     about: str = ""
-    """The message that the finding is about, where it is an input and another than the one changed."""
+    """The message that the finding is about, where it is another than the one changed."""
+    about_by: Literal["input", "autopilot"] = "input"
+    """Whose message that is."""
     stream: Stream | None = None
     """Where the message itself is the mistake: these are added."""
     least: int = 1
@@ -119,6 +121,29 @@ class MotionPlan(_Part, frozen=True):
     """One of them is added to each recording that has no estimate from outside."""
 
 
+class FileMistake(_Part, frozen=True):
+    """A mistake written into mission files (`files.py`), and the codes of which one must answer it."""
+
+    name: str
+    codes: tuple[str, ...]
+    set: dict[str, str] = {}
+    """Column -> expression that replaces it."""
+    fence: str = ""
+    """Expression that replaces the corners of the fence."""
+    where: str = "True"
+    """Items that get it."""
+    decides: str = "True"
+    """Items in which the method can tell: there it must."""
+    blind: str = ""
+    """Items in which it cannot tell and must be silent."""
+    home: bool = False
+    """Whether item 0 of a mission for ArduPilot gets it, too."""
+    least: int = 1
+    """Items that it takes."""
+    times: int = 1_000_000
+    """Items that get it at most: the last ones."""
+
+
 class Plan(_Part, frozen=True):
     """The whole file."""
 
@@ -127,6 +152,7 @@ class Plan(_Part, frozen=True):
     mistake: tuple[Mistake, ...]
     motion: MotionPlan
     stream: tuple[Stream, ...] = ()
+    file_mistake: tuple[FileMistake, ...] = ()
     unmeasured: dict[str, str] = {}
     """Code -> why no mistake of it can be written into these recordings."""
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
+import msgspec
 
 from mavframecheck.cli.output import deliver, echo, lines, page_context, parse_outputs
 from mavframecheck.cli.settings import choose, settings_options, shown
@@ -68,6 +69,12 @@ Give a recording or mission, a directory of them, or - for standard input. For e
 )
 @click.option("--diff", is_flag=True, help="Only show what --fix would change.")
 @click.option(
+    "--plan",
+    metavar="FILE",
+    type=click.Path(exists=True, dir_okay=False),
+    help="The mission that recordings were meant to fly: tracks are compared with it (MFC416).",
+)
+@click.option(
     "-v",
     "--verbose",
     is_flag=True,
@@ -87,6 +94,7 @@ def check(
     watch: Path | None,
     fix: bool,
     diff: bool,
+    plan: str | None,
     **options: Any,
 ) -> None:
     """Judge recordings and missions: files, directories, or - for standard input.
@@ -105,6 +113,7 @@ def check(
         click.echo(_EXAMPLE, err=True, nl=False)
         ctx.exit(2)
     chosen = choose(**options)
+    chosen = chosen._replace(settings=msgspec.structs.replace(chosen.settings, plan=plan))
     if diff:
         _show_diff(ctx, paths, chosen)
     audit = _audit(paths, watch, chosen, jobs or os.cpu_count() or 1, fix=fix)

@@ -10,6 +10,8 @@ import click
 
 from mavframecheck.cli.clocks import ClockTable
 from mavframecheck.cli.contract import ContractText
+from mavframecheck.cli.missions import FORMATS as MISSION_FORMATS
+from mavframecheck.cli.missions import MissionTable, export_paths
 from mavframecheck.cli.options import dialect_option, input_kind_option
 from mavframecheck.cli.output import echo, page_context
 from mavframecheck.cli.positions import FORMATS, Positions, Wish, position_options
@@ -31,9 +33,9 @@ _PIPE_WIDTH = 100
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["text", "json", *FORMATS]),
+    type=click.Choice(["text", "json", *FORMATS, *MISSION_FORMATS]),
     help="text (default) is for people; json is described in docs/output.md. "
-    "Positions: csv (default), jsonl, parquet.",
+    "Positions: csv (default), jsonl, parquet. Missions: also plan, waypoints.",
 )
 @click.option(
     "--message",
@@ -69,6 +71,11 @@ _PIPE_WIDTH = 100
     is_flag=True,
     help="Write what is sent, in which frames and how often, as a contract for 'watch --expect'.",
 )
+@click.option(
+    "--missions",
+    is_flag=True,
+    help="Show missions, fences and rally points that went over the link, and what vehicles hold.",
+)
 @position_options
 @dialect_option
 @input_kind_option
@@ -84,6 +91,7 @@ def inspect(
     clocks: bool,
     sender: int | None,
     contract: bool,
+    missions: bool,
     dialect: str,
     input_kind: str | None,
     wish: Wish | None,
@@ -94,6 +102,7 @@ def inspect(
     field its unit, frame, direction, height reference, clock, range and how much of it is missing.
     With --positions: every position as a record instead. With --origins: where positions count from. With --clocks: the clock behind each stamp.
     With --sender: axes, signs, scale, rotation, clock, delay, covariance, lever arm, resets and rate of one sender.
+    With --missions: what was uploaded and downloaded, and what vehicles hold.
     With --contract: a contract for 'watch --expect'.
 
     Exit codes: 0 done, 2 wrong usage or a file that cannot be read, 3 nothing could be decoded.
@@ -105,6 +114,7 @@ def inspect(
         "origins": origins,
         "clocks": clocks,
         "sender": sender is not None,
+        "missions": missions,
         "contract": contract,
     }
     if (wish is not None) + sum(wanted.values()) > 1:
@@ -115,6 +125,9 @@ def inspect(
         ctx.exit(exporter.show(paths, form or "csv"))
     if form in FORMATS:
         raise click.UsageError(f"--format {form} goes with --positions")
+    if form in MISSION_FORMATS and not missions:
+        raise click.UsageError(f"--format {form} goes with --missions")
+    export_paths(paths, form)
     chosen = next((view for view, asked in wanted.items() if asked), "map")
     view = VIEWS[chosen](settings, messages)
     context = page_context()
@@ -181,12 +194,13 @@ class _Origins:
         return found, found.messages
 
 
-VIEWS: dict[str, type[_Map | _Origins | ClockTable | Integration | ContractText]] = {
+VIEWS: dict[str, type[_Map | _Origins | ClockTable | Integration | ContractText | MissionTable]] = {
     "map": _Map,
     "origins": _Origins,
     "clocks": ClockTable,
     "sender": Integration,
     "contract": ContractText,
+    "missions": MissionTable,
 }
 """What `inspect` can show of a recording, by name."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mavframecheck.checks import load_check
+from mavframecheck.checks.missions.plans import Plans
 from mavframecheck.engine.compiled import CompiledRule, Pack
 from mavframecheck.engine.pack import chosen_rules
 from mavframecheck.engine.reading import Progress, Reading
@@ -12,7 +13,14 @@ from mavframecheck.missions import read_mission
 from mavframecheck.missions.upload import ITEM, Upload
 from mavframecheck.model import FileReport, Finding, RuleRun, Vehicle
 from mavframecheck.semantics.names import family, type_name
-from mavframecheck.sources import MISSIONS, RECORDINGS, Recording, open_recording
+from mavframecheck.sources import (
+    MISSIONS,
+    RECORDINGS,
+    NoRecordingError,
+    Recording,
+    SourceError,
+    open_recording,
+)
 from mavframecheck.vehicle import Context
 from mavframecheck.wire import Dialect, load_dialect
 
@@ -41,6 +49,8 @@ def check_recording(
 ) -> tuple[FileReport, tuple[Finding, ...]]:
     """Judge an open recording."""
     reading = Reading(recording, settings, dialect)
+    if settings.plan is not None:
+        Plans.of(reading.context).intend(_upload_of(settings.plan, settings, dialect).batch)
     rules = chosen_rules(pack, settings)
     runner = Runner(recording.name, rules, reading.context, dialect, only=settings.sender)
     for batch in reading.batches(progress):
@@ -94,6 +104,15 @@ def check_mission(
         runs=tuple(sorted((*runs, *idle), key=lambda run: run.code)),
     )
     return report, tuple(findings)
+
+
+def _upload_of(path: str, settings: Settings, dialect: Dialect) -> Upload:
+    """Return the batch of the mission file at `path`; SourceError when it is none."""
+    try:
+        with open_recording(path, None, MISSIONS) as file:
+            return Upload(read_mission(file), dialect, settings.autopilot)
+    except NoRecordingError as error:  # what is asked for is a setting, not a file to judge
+        raise SourceError(f"--plan: {error}") from error
 
 
 def _of_missions(rule: CompiledRule) -> bool:

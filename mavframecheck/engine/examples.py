@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from io import BytesIO
 from typing import Any
 
-from mavframecheck.engine.check import check_recording
+from mavframecheck.engine.check import check_mission, check_recording
 from mavframecheck.engine.compiled import Pack
 from mavframecheck.engine.settings import Settings
 from mavframecheck.model import Example, FileReport, Finding, Rule, Step
@@ -122,5 +122,9 @@ def run_example(
     """Judge `example` with `rule` alone."""
     dialect = load_dialect()
     pack = Pack((rule,), {rule.code: source})
+    settings = Settings(preview=True)
+    if example.file:
+        written = Recording(rule.code, BytesIO(example.file.encode()), None)
+        return check_mission(written, pack, settings, dialect)
     opened = Recording(rule.code, BytesIO(recording(example, dialect)), None)
-    return check_recording(opened, pack, Settings(preview=True), dialect)
+    return check_recording(opened, pack, settings, dialect)

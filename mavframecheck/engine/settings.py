@@ -23,6 +23,8 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True):
     """Whether rules in preview run too (one that is selected by its full code always does)."""
     autopilot: str | None = None
     """Family to assume where the recording does not say."""
+    plan: str | None = None
+    """Mission file that recordings are compared with."""
     dialect: str = DEFAULT_DIALECT
     input_kind: str | None = None
     sender: int | None = None

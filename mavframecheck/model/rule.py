@@ -117,6 +117,8 @@ class Example(_Part, frozen=True):
     """The steps go on side by side: frames in order of time, not step by step."""
     raw: str = ""
     """Bytes in hexadecimal appended after the steps (for rules about the stream itself)."""
+    file: str = ""
+    """Text of a mission file that is judged instead (for rules about what only a file says)."""
     note: str = ""
 
 

@@ -129,7 +129,7 @@ def test_the_library_gives_what_the_command_writes() -> None:
         (("--as", "ned"), "go with --positions"),
         (
             ("--positions", "--clocks"),
-            "choose one of --positions, --origins, --clocks, --sender, --contract",
+            "choose one of --positions, --origins, --clocks, --sender, --missions, --contract",
         ),
         (("--format", "csv"), "--format csv goes with --positions"),
         (("--positions", "--format", "text"), "positions are written as csv, jsonl, parquet"),

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from mavframecheck import __version__
 from mavframecheck.engine import Pack, Settings
-from mavframecheck.engine.check import check_recording
+from mavframecheck.engine.check import check_mission, check_recording
 from mavframecheck.engine.examples import recording, sender_of
 from mavframecheck.model import ByteLocation, Example, Rule, Step
 from mavframecheck.report import Checked, Context
@@ -20,16 +20,17 @@ from mavframecheck.wire import load_dialect
 from tools.pages.frames import Tlog, field_table, hexadecimal, samples
 from tools.pages.markdown import code, fence, table, text
 
-_FILE = "example.tlog"
+_RECORDING, _MISSION = "example.tlog", "example.plan"
 _MOST_STEPS = 8
 _MOST_RAW = 48
 _SENDERS = {"gcs": "the ground station"}
 
 
 class Judged(NamedTuple):
-    """The first example that a rule finds fault with, as a recording and its report."""
+    """The first example that a rule finds fault with, as a file and its report."""
 
     example: Example
+    name: str
     data: bytes
     checked: Checked
 
@@ -37,27 +38,36 @@ class Judged(NamedTuple):
 def judged(rule: Rule) -> Judged:
     """Return the first bad example of `rule`, judged by it alone."""
     example = next(each for each in rule.example if each.expect == "bad")
-    data = recording(example, load_dialect())
-    pack = Pack((rule,), {rule.code: rule.code})
-    opened = Recording(_FILE, BytesIO(data), None)
-    checked = Checked(*check_recording(opened, pack, Settings(preview=True), load_dialect()))
-    return Judged(example, data, checked)
+    dialect = load_dialect()
+    data = example.file.encode() if example.file else recording(example, dialect)
+    name = _MISSION if example.file else _RECORDING
+    pack, settings = Pack((rule,), {rule.code: rule.code}), Settings(preview=True)
+    check = check_mission if example.file else check_recording
+    checked = Checked(*check(Recording(name, BytesIO(data), None), pack, settings, dialect))
+    return Judged(example, name, data, checked)
 
 
 def shown(rule: Rule, found: Judged) -> Iterator[str]:
     """Yield what is sent, one message of it byte by byte, and what the tool prints for it."""
+    yield _before(found.example)
+    if found.example.file:
+        yield fence(found.example.file.strip(), "json")
+    else:
+        yield from _sent(found)
+    yield "What the tool prints for it:"
+    options = " --preview" if rule.status == "preview" else ""
+    command = f"$ mavframecheck check --select {rule.code}{options} {found.name}"
+    report = "".join(render([found.checked], _context()))
+    yield fence(f"{command}\n{report}")
+
+
+def _sent(found: Judged) -> Iterator[str]:
     example, tlog = found.example, Tlog(found.data)
-    yield _before(example)
     if sum(step.repeat for step in example.step) > 1 or example.raw:
         yield _steps(example)
     where = found.checked.findings[0].location
     if isinstance(where, ByteLocation):
         yield from _frame(tlog, where)
-    yield "What the tool prints for it:"
-    options = " --preview" if rule.status == "preview" else ""
-    command = f"$ mavframecheck check --select {rule.code}{options} {_FILE}"
-    report = "".join(render([found.checked], _context()))
-    yield fence(f"{command}\n{report}")
 
 
 def _context() -> Context:

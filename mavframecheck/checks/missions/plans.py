@@ -1,0 +1,348 @@
+"""The missions of a recording, with what is known of the vehicles that they are for.
+
+They are gathered once for all rules of a recording, and judged at its end.
+"""
+
+from __future__ import annotations
+
+import weakref
+from abc import abstractmethod
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mavframecheck.checks.base import Check, Observation, Verdict, place
+from mavframecheck.missions import Items, Ledger, Mission, Readback, Transactions
+from mavframecheck.missions.held import ALL_KINDS
+from mavframecheck.model import Scalar, Subject
+from mavframecheck.semantics.commands import altitude_commands, location_commands
+from mavframecheck.semantics.constants import constant
+from mavframecheck.semantics.enums import AltRef
+from mavframecheck.semantics.mavframe import FRAMES, GLOBAL_FRAMES
+from mavframecheck.semantics.names import family
+from mavframecheck.vehicle import Context
+from mavframecheck.wire import Batch, Dialect, Table
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+MAX_HOMES = 500
+"""Heights of home that are remembered of one vehicle and source."""
+HOME_STEP_M = 5.0
+"""Home moves less than this before arming, m."""
+MAX_MISSIONS = 200
+MAX_ITEMS = 50_000
+"""Missions, and items in them, that are judged."""
+MISSION, FENCE, RALLY = (
+    constant(f"MAV_MISSION_TYPE.{name}") for name in ("MISSION", "FENCE", "RALLY")
+)
+
+_SAME_DEG, _SAME_M = 5e-5, 1.0
+"""What a vehicle sends back differs by no more from what it was sent."""
+
+REFERENCE = {facts.id: facts.alt_ref for facts in FRAMES}
+"""MAV_FRAME -> what heights in it are above."""
+_PLACES = np.array(sorted(location_commands()))
+_PLACED = np.array(sorted(set(altitude_commands()) & set(location_commands())))
+_NO_HEIGHT = np.array([constant("MAV_CMD.NAV_LAND"), constant("MAV_CMD.NAV_VTOL_LAND")])
+"""Commands whose height is the ground, or not read."""
+
+
+class Plan(NamedTuple):
+    """A mission, and whom it is for."""
+
+    mission: Mission
+    vehicle: int
+    """System that it is for."""
+    sent_back: bool
+    """Whether the vehicle sent it: then it is what the vehicle holds, and no input."""
+    family: str
+    """Autopilot family, empty where nobody said."""
+    mav_type: int | None
+
+    @property
+    def items(self) -> Items:
+        """The items in order of `seq`."""
+        return self.mission.items
+
+    @property
+    def first(self) -> int:
+        """The first `seq` that is flown: item 0 is home on ArduPilot, and where nobody knows."""
+        return 0 if self.family == "px4" or self.mission.mission_type != MISSION else 1
+
+
+class Plans:
+    """Gathers missions, homes and families of vehicles."""
+
+    def __init__(self) -> None:
+        """Remember nothing yet."""
+        self._transactions = Transactions()
+        self._batch: weakref.ref[Batch] | None = None
+        self._homes: dict[int, _Heights] = {}
+        self._differences: dict[int, _Heights] = {}
+        """Height minus height above home, for vehicles that never say where home is."""
+        self._vehicles: dict[int, tuple[str, int]] = {}
+        """System -> family and MAV_TYPE, as first said."""
+        self._missions: list[Mission] = []
+        self._items = 0
+        self._contents: dict[bytes, Items] = {}
+        self._roles: dict[int, str] = {}
+        self.intended: list[Plan] = []
+        """The plan that was given beside the recording, if any."""
+
+    @staticmethod
+    def of(context: Context) -> Plans:
+        """Return the gathering that all rules of a recording share."""
+        return _GATHERED.setdefault(context, Plans())
+
+    def intend(self, batch: Batch) -> None:
+        """Take in the batch of a mission file: what was meant to be flown."""
+        transactions = Transactions()
+        missions = [*transactions.update(batch), *transactions.finish()]
+        beats = batch.tables.get("HEARTBEAT")
+        told = {} if beats is None else {each[0]: each[1:] for each in _flown(beats)}
+        for mission in missions:
+            known = told.get(mission.target, ("", None))
+            self.intended.append(Plan(mission, mission.target, False, *known))
+
+    def update(self, batch: Batch, context: Context) -> None:
+        """Take in a batch, once."""
+        if self._batch is not None and self._batch() is batch:
+            return
+        self._batch = weakref.ref(batch)
+        told = batch.tables.get("HOME_POSITION")
+        if told is not None:
+            _remember(self._homes, told, told["altitude"].astype(float) * 1e-3)
+        positions = batch.tables.get("GLOBAL_POSITION_INT")
+        if positions is not None:
+            placed = positions.take(
+                np.flatnonzero((positions["lat"] != 0) | (positions["lon"] != 0))
+            )
+            difference = placed["alt"].astype(float) - placed["relative_alt"]
+            _remember(self._differences, placed, difference * 1e-3)
+        if "HEARTBEAT" in batch.tables:
+            for sysid, known, mav_type in _flown(batch.tables["HEARTBEAT"]):
+                self._vehicles.setdefault(sysid, (known, mav_type))
+        for mission in self._transactions.update(batch):
+            self._keep(mission)
+        self._roles = {each.sender: context.role(each.sender) for each in self._missions}
+
+    def _keep(self, mission: Mission) -> None:
+        """Keep a mission; what has the same content shares it."""
+        content = _content(mission.items)
+        if len(self._missions) >= MAX_MISSIONS or self._items >= MAX_ITEMS:
+            return
+        if content in self._contents:
+            mission.items = self._contents[content]
+        else:
+            self._contents[content] = mission.items
+            self._items += len(mission.items)
+        self._missions.append(mission)
+        self._roles.setdefault(mission.sender, "unknown")
+
+    def finished(self, context: Context) -> list[Plan]:
+        """Return every mission that was sent, each content once a sender, at the end of the recording.
+
+        What a vehicle only sends back as it got it is left out.
+        """
+        for mission in self._transactions.finish():
+            self._keep(mission)
+            self._roles[mission.sender] = context.role(mission.sender)
+        once: dict[tuple[int, int, int, int], Mission] = {}
+        for mission in self._missions:
+            key = (mission.sender, mission.target, mission.mission_type, id(mission.items))
+            if len(mission.items):
+                once.setdefault(key, mission)
+        plans = [self._plan(mission) for mission in once.values()]
+        sent = [plan for plan in plans if not plan.sent_back]
+        return [p for p in plans if not p.sent_back or not any(_repeats(p, s) for s in sent)]
+
+    def _plan(self, mission: Mission) -> Plan:
+        sent_back = self._roles[mission.sender] == "autopilot"
+        vehicle = mission.sender >> 8 if sent_back else mission.target
+        if vehicle not in self._vehicles and not mission.target and len(self._vehicles) == 1:
+            vehicle = next(iter(self._vehicles))
+        return Plan(mission, vehicle, sent_back, *self._vehicles.get(vehicle, ("", None)))
+
+    def replaced_at(self, plan: Plan) -> float:
+        """Return the frame number at which a vehicle got another mission than `plan`, infinity if it never did."""
+        later = [
+            mission.ended
+            for mission in self._missions
+            if mission.target == plan.vehicle
+            and mission.mission_type in (MISSION, ALL_KINDS)
+            and mission.ended > plan.mission.ended
+            and mission.items is not plan.items
+        ]
+        return min(later, default=np.inf)
+
+    def readbacks(self) -> list[Readback]:
+        """Return what vehicles sent back, with what they should have held."""
+        ledger = Ledger(lambda sender: self._roles[sender] == "autopilot")
+        return ledger.enter(self._missions).readbacks
+
+    def family(self, system: int) -> str:
+        """Return the autopilot family of a system, empty where nobody said."""
+        return self._vehicles.get(system, ("", 0))[0]
+
+    def home_m(self, plan: Plan) -> float | None:
+        """Return the height of home when a mission was sent, else the first one known, else that of item 0."""
+        number = plan.mission.ended
+        for kept in (self._homes, self._differences):
+            heights = kept.get(plan.vehicle)
+            found = heights.at(number) if heights is not None else None
+            if found is not None:
+                return found
+        items = plan.items
+        says_home = items.seq[0] == 0 and REFERENCE.get(int(items.frame[0])) == AltRef.MSL
+        if plan.first == 1 and says_home and items.z[0] != 0:
+            return float(items.z[0])
+        return None
+
+
+_GATHERED: weakref.WeakKeyDictionary[Context, Plans] = weakref.WeakKeyDictionary()
+
+
+class MissionCheck(Check):
+    """A rule about whole missions."""
+
+    of_missions = True
+
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
+        """Have judged nothing yet."""
+        super().__init__(params, dialect)
+        self._context: Context | None = None
+        self.looked = 0
+        """Missions, items or legs that could be judged."""
+        self.missing = ""
+        """Why others could not."""
+
+    def update(self, batch: Batch, context: Context) -> None:
+        """Let the missions be gathered."""
+        self._context = context
+        Plans.of(context).update(batch, context)
+
+    def finish(self) -> Iterable[Observation]:
+        """Return what is wrong with the missions of the recording."""
+        if self._context is not None:
+            plans = Plans.of(self._context)
+            yield from self.judge_all(plans, plans.finished(self._context))
+
+    @abstractmethod
+    def judge_all(self, plans: Plans, sent: list[Plan]) -> Iterator[Observation]:
+        """Yield what is wrong; count in `looked` what was judged, say in `missing` what was not."""
+
+    def verdict(self) -> Verdict:
+        """Return how much was judged, once all was."""
+        return Verdict(self.looked, "" if self.looked else self.missing)
+
+    def observed(
+        self, items: Items, rows: Ints, values: Mapping[str, Scalar], field: str | None = None
+    ) -> Observation:
+        """Return an observation about the items at `rows`."""
+        frames = items.frames
+        first, last = int(rows[0]), int(rows[-1])
+        message = self.dialect.layouts[int(frames.msgid[first])].name
+        return Observation(
+            Subject(int(frames.sysid[first]), int(frames.compid[first]), message, field),
+            place(frames, first),
+            place(frames, last),
+            len(rows),
+            values,
+        )
+
+
+class EachMission(MissionCheck):
+    """A rule about each mission by itself."""
+
+    kinds: tuple[int, ...] = (MISSION,)
+    """MAV_MISSION_TYPE that it is about."""
+
+    def judge_all(self, plans: Plans, sent: list[Plan]) -> Iterator[Observation]:
+        """Judge one after the other."""
+        for plan in sent:
+            if plan.mission.mission_type in self.kinds:
+                yield from self.judge(plan, plans)
+
+    @abstractmethod
+    def judge(self, plan: Plan, plans: Plans) -> Iterator[Observation]:
+        """Yield what is wrong with a mission."""
+
+
+class _Heights:
+    """Heights of home, where they changed, in frame order."""
+
+    def __init__(self) -> None:
+        self._numbers: list[int] = []
+        self._values: list[float] = []
+
+    def add(self, numbers: Ints, heights: Floats) -> None:
+        """Keep each height that differs by more than a step from the one kept before."""
+        row = 0
+        while len(self._values) < MAX_HOMES:
+            last = self._values[-1] if self._values else np.nan
+            changed = np.flatnonzero(~(np.abs(heights[row:] - last) < HOME_STEP_M))
+            if not len(changed):
+                return
+            row += int(changed[0])
+            self._numbers.append(int(numbers[row]))
+            self._values.append(float(heights[row]))
+            row += 1
+
+    def at(self, number: int) -> float | None:
+        """Return the height that held at a frame, else the first one known."""
+        before = bisect_right(self._numbers, number) - 1
+        return self._values[max(before, 0)] if self._values else None
+
+
+def _remember(kept: dict[int, _Heights], table: Table, heights: Floats) -> None:
+    for sysid in np.unique(table.frames.sysid).tolist():
+        rows = np.flatnonzero(table.frames.sysid == sysid)
+        numbers = table.frames.number[rows].astype(np.int64)
+        kept.setdefault(sysid, _Heights()).add(numbers, heights[rows])
+
+
+def _flown(beats: Table) -> Iterator[tuple[int, str, int]]:
+    """Yield each system's first word of what it flies in (n,) HEARTBEATs: system, family, MAV_TYPE."""
+    speaks = beats.take(np.flatnonzero(beats["autopilot"] != constant("MAV_AUTOPILOT.INVALID")))
+    systems, first = np.unique(speaks.frames.sysid, return_index=True)
+    for sysid, row in zip(systems.tolist(), first.tolist(), strict=True):
+        mav_type = int(speaks["type"][row])
+        yield sysid, family(int(speaks["autopilot"][row]), mav_type), mav_type
+
+
+def _repeats(back: Plan, sent: Plan) -> bool:
+    """Return whether a vehicle sends back what it was sent, but for home in item 0."""
+    one, other = back.items, sent.items
+    kinds = back.vehicle == sent.vehicle and back.mission.mission_type == sent.mission.mission_type
+    if not kinds or len(one) != len(other) or (one.seq != other.seq).any():
+        return False
+    flown = one.seq >= back.first
+    same = (one.command == other.command) & ~(np.abs(one.z - other.z) > _SAME_M)
+    same &= ~(np.abs(one.x - other.x) > _SAME_DEG) & ~(np.abs(one.y - other.y) > _SAME_DEG)
+    return bool(same[flown].all())
+
+
+def _content(items: Items) -> bytes:
+    whole = np.stack([items.seq, items.command, items.frame], axis=1).tobytes()
+    return whole + items.params.tobytes() + np.stack([items.x, items.y, items.z]).tobytes()
+
+
+def with_place(items: Items) -> Bools:
+    """Return (n,) items with a latitude and a longitude."""
+    placed = np.isin(items.command, _PLACES) & np.isin(items.frame, GLOBAL_FRAMES)
+    somewhere = (items.x != 0) | (items.y != 0)
+    legal = (np.abs(items.x) <= 90) & (np.abs(items.y) <= 180)
+    return np.asarray(placed & somewhere & legal)
+
+
+def with_height(items: Items) -> Bools:
+    """Return (n,) items with a place and a height that is flown."""
+    placed = np.isin(items.command, _PLACED) & ~np.isin(items.command, _NO_HEIGHT)
+    somewhere = (items.x != 0) | (items.y != 0)
+    whole = placed & np.isin(items.frame, GLOBAL_FRAMES) & somewhere & np.isfinite(items.z)
+    return np.asarray(whole)
