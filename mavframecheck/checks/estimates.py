@@ -1,4 +1,4 @@
-"""Streams of poses row by row: jumps that nobody announced, counters that run, poses that stand still."""
+"""Streams of poses row by row: jumps that nobody announced, counters that run, rates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
-from mavframecheck.geo.geodesy import distance_m
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.vehicle import Context
 from mavframecheck.wire import Batch, Dialect, Table
@@ -25,7 +24,12 @@ MAX_STREAMS = 256
 COUNTED = ("VISION_POSITION_ESTIMATE", "GLOBAL_VISION_POSITION_ESTIMATE", "ODOMETRY")
 """Poses with a reset counter."""
 POSES = (*COUNTED, "VICON_POSITION_ESTIMATE", "ATT_POS_MOCAP")
-_FRAMES = ("frame_id", "child_frame_id")
+VARIANTS = {
+    "ODOMETRY": ("frame_id", "child_frame_id"),
+    "GPS_INPUT": ("gps_id",),
+    "HIL_GPS": ("id",),
+}
+"""Fields that tell streams of one sender apart: frames, or the receiver."""
 
 
 class Key(NamedTuple):
@@ -33,8 +37,8 @@ class Key(NamedTuple):
 
     sender: int
     message: str
-    frames: int
-    """Frames of an ODOMETRY; they never follow each other."""
+    variant: int
+    """Values of its `VARIANTS`: such rows never follow each other."""
 
 
 @dataclass(slots=True)
@@ -61,10 +65,12 @@ class Found:
 State = TypeVar("State", bound=Found)
 
 
-class _PoseCheck(Check, Generic[State]):
+class PoseCheck(Check, Generic[State]):
     """Follows the poses that are sent to a vehicle; what autopilots send is none."""
 
     messages: tuple[str, ...] = POSES
+    autopilots = False
+    """Whether what autopilots send counts."""
 
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Know no stream yet."""
@@ -73,7 +79,7 @@ class _PoseCheck(Check, Generic[State]):
 
     def update(self, batch: Batch, context: Context) -> None:
         """Follow every stream through the batch."""
-        for key, table in _poses(batch, context, self.messages):
+        for key, table in _poses(batch, context, self.messages, autopilots=self.autopilots):
             found = self._streams.get(key)
             if found is None:
                 if len(self._streams) >= MAX_STREAMS:
@@ -105,28 +111,29 @@ class _PoseCheck(Check, Generic[State]):
 
 
 def _poses(
-    batch: Batch, context: Context, messages: tuple[str, ...]
+    batch: Batch, context: Context, messages: tuple[str, ...], *, autopilots: bool
 ) -> Iterator[tuple[Key, Table]]:
     for message in messages:
         table = batch.tables.get(message)
         if table is None:
             continue
-        role = context.lookup("sender.role", table)
-        table = table.take(~role.among(lambda name: name == "autopilot"))
-        key = table.frames.sender << 16
-        for name in _FRAMES if message == "ODOMETRY" else ():
-            key = key << 8 | table[name].astype(np.int64)
-        if message != "ODOMETRY":
-            key = key << 16
+        if not autopilots:
+            role = context.lookup("sender.role", table)
+            table = table.take(~role.among(lambda name: name == "autopilot"))
+        variant = np.zeros(len(table), np.int64)
+        for name in VARIANTS.get(message, ()):
+            variant = variant << 8 | table[name].astype(np.int64)
+        key = table.frames.sender.astype(np.int64) << 16 | variant
         for each in np.unique(key).tolist():
-            yield Key(each >> 32, message, each & 0xFFFF), table.take(key == each)
+            yield Key(each >> 16, message, each & 0xFFFF), table.take(key == each)
 
 
-def _xyz(table: Table) -> Floats:
+def xyz(table: Table) -> Floats:
+    """Return (n, 3) the position of poses, m."""
     return np.column_stack([table[name].astype(np.float64) for name in ("x", "y", "z")])
 
 
-class UnsignalledReset(_PoseCheck[Found]):
+class UnsignalledReset(PoseCheck[Found]):
     """Steps that are no motion, with the reset counter as before."""
 
     messages = COUNTED
@@ -138,12 +145,12 @@ class UnsignalledReset(_PoseCheck[Found]):
     def follow(self, found: Found, table: Table, _context: Context) -> None:
         """Look at each step beside the one before and the one after it."""
         frames = table.frames
-        table = table.take((frames.version == 2) & frames.t_valid & np.isfinite(_xyz(table)).all(1))
+        table = table.take((frames.version == 2) & frames.t_valid & np.isfinite(xyz(table)).all(1))
         if found.tail is not None:
             table = join([found.tail, table])
         if not len(table):
             return
-        fresh = np.any(np.diff(_xyz(table), axis=0) != 0, axis=1)
+        fresh = np.any(np.diff(xyz(table), axis=0) != 0, axis=1)
         table = table.take(np.concatenate(([True], fresh)))  # repeated poses hide how fast it goes
         found.tail = table.take(np.arange(max(len(table) - 3, 0), len(table))).compact()
         if len(table) < 4:
@@ -156,7 +163,7 @@ class UnsignalledReset(_PoseCheck[Found]):
 
     def _jumps(self, table: Table) -> Ints:
         """Return the rows that a jump leads to: not the first two, nor the last."""
-        where, dt = _xyz(table), np.diff(table.frames.t_us) * 1e-6
+        where, dt = xyz(table), np.diff(table.frames.t_us) * 1e-6
         went = np.linalg.norm(np.diff(where, axis=0), axis=1)
         calm = np.clip(dt, self.params["min_interval_s"], None)
         speed = went / calm
@@ -171,7 +178,7 @@ class UnsignalledReset(_PoseCheck[Found]):
         return np.flatnonzero(jumped) + 2
 
     def _describe(self, found: Found, table: Table, jumps: Ints) -> None:
-        where = _xyz(table)
+        where = xyz(table)
         for row in jumps.tolist():
             step = where[row] - where[row - 1]
             length = float(np.linalg.norm(step))
@@ -193,7 +200,7 @@ class _Counting(Found):
     changes: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
-class RunningResetCounter(_PoseCheck[_Counting]):
+class RunningResetCounter(PoseCheck[_Counting]):
     """Counters that go up once a second and more, for long."""
 
     messages = COUNTED
@@ -226,91 +233,56 @@ class RunningResetCounter(_PoseCheck[_Counting]):
 
 
 @dataclass(slots=True)
-class _Standing(Found):
-    """The last position of a stream, and where the vehicle was when it was first sent."""
+class _Beating(Found):
+    """How often a stream comes."""
 
-    pose: Floats | None = None
-    begun: Place | None = None
-    since: int = 0
-    """Rows with this position so far."""
-    lat: float = np.nan
-    lon: float = np.nan
-    heard_at: tuple[float, float] = (np.nan, np.nan)
-    """Where the vehicle was when the stream was first heard, deg."""
-    went_m: float = 0.0
-    """How far it was away from there since."""
+    last_us: int = 0
+    intervals: int = 0
+    live_us: int = 0
+    """Intervals without a pause, and how long they are together, us."""
+    autopilot: str = "unknown"
 
 
-def _first_known(carried: float, values: Floats, start: Ints) -> Floats:
-    """Return (n,) the first value that is known from row `start` on; `carried` where that is negative."""
-    known = np.flatnonzero(np.isfinite(values))
-    if not len(known):
-        return np.where(start < 0, carried, np.nan)
-    at = known[np.minimum(np.searchsorted(known, np.maximum(start, 0)), len(known) - 1)]
-    inside = (at >= start) & (at <= np.arange(len(values)))
-    found = np.where(inside, values[at], np.nan)
-    return np.where((start < 0) & np.isfinite(carried), carried, found)
+class Rate(PoseCheck[_Beating]):
+    """Poses that come more rarely, or more often, than an estimator can use."""
 
-
-class FrozenPose(_PoseCheck[_Standing]):
-    """Positions that stay the same to the last digit while the vehicle goes somewhere else."""
-
-    def begin(self) -> _Standing:
+    def begin(self) -> _Beating:
         """Return the state of a new stream."""
-        return _Standing()
+        return _Beating()
 
-    def follow(self, found: _Standing, table: Table, context: Context) -> None:
-        """Judge every row by how long its position stood, and where the vehicle was at the beginning."""
-        pose = _xyz(table)
-        lat, lon = (
-            context.lookup(name, table, late=False).values
-            for name in ("vehicle.lat", "vehicle.lon")
-        )
-        before = pose[:1] + 1 if found.pose is None else found.pose[np.newaxis]
-        fresh = np.any(pose != np.concatenate((before, pose[:-1])), axis=1)
-        rows = np.arange(len(table))
-        start = np.maximum.accumulate(np.where(fresh, rows, -1))
-        count = rows - start + np.where(start < 0, found.since, 1)
-        lat0 = _first_known(found.lat, lat, start)
-        lon0 = _first_known(found.lon, lon, start)
-        away = distance_m(lat0, lon0, lat, lon)
-        moved = (count >= self.params["min_rows"]) & (away >= self.params["min_moved_m"])
-        self._note(found, table, np.flatnonzero(moved), start, count, away)
-        found.pose, found.since = pose[-1], int(count[-1])
-        found.lat, found.lon = float(lat0[-1]), float(lon0[-1])
-        if start[-1] >= 0:
-            found.begun = place(table.frames, int(start[-1]))
-        self._travel(found, lat, lon)
-
-    @staticmethod
-    def _travel(found: _Standing, lat: Floats, lon: Floats) -> None:
-        known = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon))
-        if not len(known):
+    def follow(self, found: _Beating, table: Table, context: Context) -> None:
+        """Add the intervals between rows."""
+        table = table.take(table.frames.t_valid)
+        if not len(table):
             return
-        if not np.isfinite(found.heard_at[0]):
-            found.heard_at = float(lat[known[0]]), float(lon[known[0]])
-        away = distance_m(*found.heard_at, lat[known], lon[known])
-        found.went_m = max(found.went_m, float(away.max()))
+        found.first = found.first or place(table.frames, 0)
+        found.last = place(table.frames, len(table) - 1)
+        family = str(context.lookup("vehicle.autopilot", table).words[-1])
+        found.autopilot = found.autopilot if family == "unknown" else family
+        before = [found.last_us] if found.last_us else []
+        dt = np.diff(np.concatenate((before, table.frames.t_us)).astype(np.int64))
+        goes_on = dt[(dt >= 0) & (dt <= self.params["pause_s"] * 1e6)]
+        found.intervals += len(goes_on)
+        found.live_us += int(goes_on.sum())
+        found.last_us = int(table.frames.t_us[-1])
+        found.hits = found.rows if self._wrong(found) else 0
+
+    def _wrong(self, found: _Beating) -> bool:
+        if found.live_us < self.params["min_live_s"] * 1e6:
+            return False
+        hz = found.intervals / (found.live_us * 1e-6)
+        least = self.params["px4_min_hz" if found.autopilot == "px4" else "min_hz"]
+        found.values = {"hz": round(hz, 6), "least_hz": least, "autopilot": found.autopilot}
+        return not least <= hz <= self.params["max_hz"]
+
+    def finish(self) -> Iterable[Observation]:
+        """Return one observation per stream that comes at another rate."""
+        yield from (each for each in super().finish() if each.times)
 
     def verdict(self) -> Verdict:
-        """Return the rows of streams during which the vehicle went far enough."""
-        heard = [f for key, f in self._streams.items() if self.concerns_sender(key.sender)]
-        rows = sum(f.rows for f in heard if f.went_m >= self.params["min_moved_m"])
-        return Verdict(rows, "the vehicle hardly moves" if heard and not rows else "")
-
-    def _note(
-        self, found: _Standing, table: Table, hits: Ints, start: Ints, count: Ints, away: Floats
-    ) -> None:
-        if not len(hits):
-            return
-        if found.first is None:
-            began = int(start[hits[0]])
-            found.first = found.begun if began < 0 else place(table.frames, began)
-        found.hit(table, hits)
-        at = {name: float(table[name][hits[0]]) for name in ("x", "y", "z")}
-        found.values = {
-            **at,
-            **found.values,
-            "moved_m": max(float(found.values.get("moved_m") or 0.0), float(away[hits].max())),
-            "rows": max(int(found.values.get("rows") or 0), int(count[hits].max())),
-        }
+        """Return the rows of streams that go on for long enough."""
+        least = self.params["min_live_s"] * 1e6
+        told = sum(found.rows for found in self._streams.values() if found.live_us >= least)
+        if self._streams and not told:
+            return Verdict(0, "no stream of poses goes on for long enough")
+        return Verdict(told)

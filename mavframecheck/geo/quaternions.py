@@ -19,7 +19,8 @@ def unit(q: npt.ArrayLike) -> Floats:
     """Return (..., 4) quaternions of length 1; NaN where there is nothing to scale."""
     given = np.asarray(q, float)
     length = np.linalg.norm(given, axis=-1, keepdims=True)
-    scaled: Floats = given / np.where(length > _SHORTEST, length, np.nan)
+    known = (length > _SHORTEST) & np.isfinite(length)
+    scaled: Floats = given / np.where(known, length, np.nan)
     return scaled
 
 
@@ -45,8 +46,12 @@ def inverse(b_from_a: npt.ArrayLike) -> Floats:
 
 
 def quaternion_from_euler(roll: npt.ArrayLike, pitch: npt.ArrayLike, yaw: npt.ArrayLike) -> Floats:
-    """Return (..., 4) `ned_from_frd` of angles in ZYX order: first yaw, then pitch, then roll."""
-    r, p, y = np.broadcast_arrays(*(np.asarray(a, float) / 2 for a in (roll, pitch, yaw)))
+    """Return (..., 4) `ned_from_frd` of angles in ZYX order: first yaw, then pitch, then roll.
+
+    NaN where an angle is none.
+    """
+    halves = (np.asarray(a, float) / 2 for a in (roll, pitch, yaw))
+    r, p, y = np.broadcast_arrays(*(np.where(np.isfinite(a), a, np.nan) for a in halves))
     sr, cr, sp, cp, sy, cy = np.sin(r), np.cos(r), np.sin(p), np.cos(p), np.sin(y), np.cos(y)
     return np.stack(
         [
@@ -129,6 +134,17 @@ def about_z(angle: npt.ArrayLike) -> Floats:
     half = np.asarray(angle, float) / 2
     zero = np.zeros_like(half)
     return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+
+
+def mean(rotations: npt.ArrayLike) -> Floats:
+    """Return (4,) the rotation nearest to all (n, 4) of them, whatever their signs.
+
+    The eigenvector of the largest eigenvalue of the sum of ``q q^T``. Source: F. L. Markley et al. (2007).
+    """
+    q = np.asarray(rotations, float)
+    _, vectors = np.linalg.eigh(q.T @ q)
+    found: Floats = vectors[:, -1] * (1.0 if vectors[0, -1] >= 0 else -1.0)
+    return found
 
 
 def between(share: npt.ArrayLike, a: npt.ArrayLike, b: npt.ArrayLike) -> Floats:

@@ -93,11 +93,21 @@ def _fixed(table: Table) -> Bools:
     return np.asarray((table["fix_type"] >= 3) & ((table["lat"] != 0) | (table["lon"] != 0)))
 
 
+def _blowing(table: Table) -> Floats:
+    """Return (n, 3) where WIND blows to, m/s NED: its direction is where it comes from."""
+    towards = np.radians(table["direction"].astype(np.float64) + 180)
+    towards = np.where(np.isfinite(towards), towards, np.nan)
+    speed = table["speed"].astype(np.float64)
+    return np.column_stack((speed * np.cos(towards), speed * np.sin(towards), table["speed_z"]))
+
+
 _XYZ = _fields("x", "y", "z")
 _VXYZ = _fields("vx", "vy", "vz")
 _RPY = _fields("roll", "pitch", "yaw")
 _VELOCITY_IGNORED = 8 | 16
 """Bits of GPS_INPUT.ignore_flags: horizontal and vertical velocity."""
+_ATTITUDE_IGNORED = 128
+"""Bit of SET_ATTITUDE_TARGET.type_mask."""
 _USEC = _fields("usec", scale=1e-6)
 _TIME_USEC = _fields("time_usec", scale=1e-6)
 _BOOT_MS = _fields("time_boot_ms", scale=1e-3)
@@ -128,6 +138,11 @@ SOURCES: dict[str, Source] = {
             "VICON_POSITION_ESTIMATE",
         )
     },
+    "SET_ATTITUDE_TARGET": Source(
+        attitude=_array("q"),
+        valid=lambda table: np.asarray(table["type_mask"] & _ATTITUDE_IGNORED == 0),
+        variant=("target_system", "type_mask"),
+    ),
     "VISION_SPEED_ESTIMATE": Source(velocity=_XYZ, stamp=_USEC),
     "ATT_POS_MOCAP": Source(place=_XYZ, attitude=_array("q"), stamp=_TIME_USEC),
     "ODOMETRY": Source(
@@ -138,6 +153,8 @@ SOURCES: dict[str, Source] = {
         stamp=_TIME_USEC,
         variant=("frame_id", "child_frame_id"),
     ),
+    "WIND": Source(velocity=_blowing),
+    "WIND_COV": Source(velocity=_fields("wind_x", "wind_y", "wind_z")),
     "GPS_INPUT": Source(
         velocity=_unless(
             _fields("vn", "ve", "vd"),
@@ -236,7 +253,8 @@ class Tracks:
         self.tracks: dict[TrackKey, Track] = {}
         self.timed = False
         """Whether there were receive times that can be believed."""
-        self._t0_us: int | None = None
+        self.t0_us: int | None = None
+        """The first receive time that can be believed: times count from it."""
         self._level = 0
 
     def update(self, batch: Batch) -> None:
@@ -248,8 +266,8 @@ class Tracks:
 
     def _streams(self, batch: Batch) -> Iterator[tuple[TrackKey, Table]]:
         frames = batch.frames
-        if self._t0_us is None and frames.t_valid.any():
-            self._t0_us = int(frames.t_us[np.argmax(frames.t_valid)])
+        if self.t0_us is None and frames.t_valid.any():
+            self.t0_us = int(frames.t_us[np.argmax(frames.t_valid)])
             self.timed = True
         for name in batch.tables.keys() & SOURCES.keys():
             table = batch.tables[name]
@@ -267,7 +285,7 @@ class Tracks:
                 return
             at = seen(table.frames, 0)
             track = self.tracks[key] = Track(key, SOURCES[key.message], at, at)
-        since = table.frames.t_us - (self._t0_us or 0)
+        since = table.frames.t_us - (self.t0_us or 0)
         bins = np.maximum(since // BIN_US, 0)
         while int(bins.max()) // WINDOW_BINS >> self._level >= MAX_WINDOWS:
             self._level += 1

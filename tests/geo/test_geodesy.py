@@ -96,6 +96,22 @@ def test_ned_there_and_back(ned: tuple[float, ...], lat0: float, lon0: float, h0
     np.testing.assert_allclose(ned_from_geodetic(lat, lon, h, lat0, lon0, h0), ned, atol=1e-5)
 
 
+@pytest.mark.parametrize("lat0", [0.0, 47.4, -35.36, 89.0])
+@pytest.mark.parametrize("lon0", [0.0, 90.0, 179.999999, -180.0])
+@pytest.mark.parametrize("h0", [0.0, -400.0, 2500.0])
+def test_small_steps(lat0: float, lon0: float, h0: float) -> None:
+    """The origin is zero, and a step north, east or up is one along its axis, across 180 degrees, too."""
+    step = 1e-5
+    north_m = Geodesic.WGS84.Inverse(lat0, lon0, lat0 + step, lon0)["s12"]
+    east_m = Geodesic.WGS84.Inverse(lat0, lon0, lat0, lon0 + step)["s12"]
+    steps = np.array([[0, 0, 0], [step, 0, 0], [0, step, 0], [0, 0, 1.0]])
+    lat, lon, h = (steps + np.array([lat0, lon0, h0])).T
+    found = ned_from_geodetic(lat, (lon + 180) % 360 - 180, h, lat0, lon0, h0)
+    higher = 1 + h0 / 6.37e6
+    expected = [[0, 0, 0], [north_m * higher, 0, 0], [0, east_m * higher, 0], [0, 0, -1]]
+    np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
 def test_down_is_down() -> None:
     np.testing.assert_allclose(geodetic_from_ned([0, 0, -5], 47, 8, 400), [47, 8, 405])
     np.testing.assert_allclose(ned_from_geodetic(47, 8, 405, 47, 8, 400), [0, 0, -5], atol=1e-8)

@@ -23,11 +23,15 @@ FITS = np.radians(6.0)
 """A reading that leaves more than this, rad, is none."""
 CLEARLY = 0.3
 """It must leave less than this share of what the label leaves."""
+MOUNT_EXTRA = np.radians(1.0)
+"""A turned sensor must explain more than any simpler reading by this, rad."""
+MOUNT_ROUNDS = 8
+"""Where the heading is free, too, both are found in turns."""
 MIN_TURN = np.radians(30.0)
 """Yaw must change by so much, rad, before an offset is told from a sign."""
 
 
-NEED_TURN = ("yaw_offset", "yaw_sign")
+NEED_TURN = ("yaw_offset", "yaw_sign", "mount")
 """Kinds of readings that show only where the yaw changes."""
 
 
@@ -39,6 +43,8 @@ class Reading(NamedTuple):
     of: Callable[[Floats], Floats]
     """From (n, 4) `ned_from_frd` to what the stream would hold."""
     free_yaw: bool = False
+    free_mount: bool = False
+    """Whether the sensor may be turned in the vehicle: this explains most, so that others come first."""
     back: Callable[[Floats], Floats] | None = None
     """What undoes `of`, where doing it again does not."""
 
@@ -98,6 +104,7 @@ READINGS = (
     Reading("frames", "it is of front-left-up axes", lambda q: q4.product(q, _FLU)),
     Reading("frames", "it is in east-north-up", lambda q: q4.product(_ENU, q)),
     Reading("frames", "it is in north-west-up", lambda q: q4.product(_FLU, q)),
+    Reading("mount", "", _same, free_mount=True),
 )
 """In order of simplicity: of two that leave the same, the first one counts."""
 
@@ -127,12 +134,15 @@ def compare(
     *,
     free_heading: bool,
     since_s: float,
-    delay_s: float | None,
+    delays: Floats = DELAYS_S,
+    fits: float = FITS,
 ) -> Lie | str:
-    """Say how the attitude of `stream` is to be read, or why that cannot be told."""
+    """Say how the attitude of `stream` is to be read, or why that cannot be told.
+
+    It may come so many seconds later than the reference as `delays` (k,) say, and may be off by `fits` rad.
+    """
     at = stream.t[stream.t >= since_s]
     at = at[np.diff(np.floor(at / GRID_S), prepend=-np.inf) > 0]
-    delays = DELAYS_S if delay_s is None else np.array([delay_s])
     best: tuple[float, float, list[_Read]] | None = None
     for delay in delays.tolist():
         mine, theirs = stream.attitudes(at), reference.attitudes(at - delay)
@@ -147,7 +157,7 @@ def compare(
             best = least, delay, reads
     if best is None:
         return "no attitude of the vehicle at the same time"
-    return _choose(best[2], best[1], (float(at[0]), float(at[-1])))
+    return _choose(best[2], best[1], (float(at[0]), float(at[-1])), fits)
 
 
 class _Read(NamedTuple):
@@ -160,6 +170,27 @@ class _Read(NamedTuple):
     yaw: float
     turned: float
     """How far the yaw of the vehicle varies, rad."""
+    mount: Floats
+    """(4,) `frd_from_sensor`."""
+
+    @property
+    def says(self) -> str:
+        """Return the reading in words."""
+        if not self.reading.free_mount:
+            return self.reading.says
+        roll, pitch, yaw = (
+            round(x) for x in np.degrees(q4.euler_from_quaternion(self.mount)).tolist()
+        )
+        return (
+            "it is the attitude of a sensor that sits turned in the vehicle, "
+            f"by roll {roll}, pitch {pitch}, yaw {yaw} degrees"
+        )
+
+    @property
+    def rank(self) -> int:
+        """Return a number by which readings are sorted: half degrees, so that the simpler one wins a draw."""
+        extra = MOUNT_EXTRA if self.reading.free_mount else 0.0
+        return round(float(np.degrees(self.mean + extra)) * 2)
 
     @property
     def mean(self) -> float:
@@ -173,25 +204,32 @@ def _usual(off: Floats) -> float:
 
 
 def _read(reading: Reading, mine: Floats, theirs: Floats, *, free_heading: bool) -> _Read:
-    predicted = reading.of(theirs)
-    yaw = 0.0
-    if free_heading or reading.free_yaw:
-        turns = q4.twist(q4.product(reading.undo(mine), q4.inverse(theirs)))
-        yaw = float(np.angle(np.exp(1j * turns).sum()))
-        yaw += float(np.median(np.angle(np.exp(1j * (turns - yaw)))))
-        predicted = reading.of(q4.product(q4.about_z(yaw), theirs))
+    yaw, mount = 0.0, np.array([1.0, 0, 0, 0])
+    free = free_heading or reading.free_yaw
+    for _ in range(MOUNT_ROUNDS if free and reading.free_mount else 1):
+        if reading.free_mount:
+            lies = q4.product(q4.about_z(yaw), theirs)
+            mount = q4.mean(q4.product(q4.inverse(lies), mine))
+        if free:
+            bare = q4.product(mine, q4.inverse(mount))
+            turns = q4.twist(q4.product(reading.undo(bare), q4.inverse(theirs)))
+            yaw = float(np.angle(np.exp(1j * turns).sum()))
+            yaw += float(np.median(np.angle(np.exp(1j * (turns - yaw)))))
+    predicted = q4.product(reading.of(q4.product(q4.about_z(yaw), theirs)), mount)
     heading = np.exp(1j * q4.euler_from_quaternion(theirs)[:, 2])
     spread = np.abs(np.angle(heading / (heading.mean() or 1.0)))
     turned = float(np.percentile(spread, 85)) * 2  # more than the mean leaves out
     off = q4.angle_between(mine, predicted)
-    return _Read(reading, off, predicted, float(np.angle(np.exp(1j * yaw))), turned)
+    return _Read(reading, off, predicted, float(np.angle(np.exp(1j * yaw))), turned, mount)
 
 
-def _choose(reads: list[_Read], delay_s: float, times: tuple[float, float]) -> Lie | str:
+def _choose(
+    reads: list[_Read], delay_s: float, times: tuple[float, float], fits: float
+) -> Lie | str:
     labelled = reads[0]
     hidden = {read.reading.kind for read in reads[1:] if not _shows(read, labelled)}
     told = frozenset(read.reading.kind for read in reads[1:]) - hidden
-    ranked = sorted(reads[1:], key=lambda read: round(np.degrees(read.mean) * 2))
+    ranked = sorted(reads[1:], key=lambda read: read.rank)
     if labelled.mean <= ranked[0].mean * 1.05 + np.radians(0.3):
         return _lie(labelled, labelled, labelled.off >= 0, delay_s, times, told)
     for read in ranked[:1]:
@@ -201,7 +239,7 @@ def _choose(reads: list[_Read], delay_s: float, times: tuple[float, float]) -> L
         lie = _lie(read, labelled, telling, delay_s, times, told)
         if read.reading.kind in NEED_TURN and read.turned < MIN_TURN:
             return "the vehicle hardly turns"
-        if lie.left < FITS and lie.left < CLEARLY * lie.labelled:
+        if lie.left < fits and lie.left < CLEARLY * lie.labelled:
             return lie
     undecided = told - {ranked[0].reading.kind}
     return _lie(labelled, labelled, labelled.off >= 0, delay_s, times, undecided)
@@ -226,7 +264,7 @@ def _lie(
 ) -> Lie:
     return Lie(
         read.reading.kind,
-        read.reading.says,
+        read.says,
         float(np.median(read.off[telling])),
         float(np.median(labelled.off[telling])),
         read.yaw,

@@ -12,6 +12,7 @@ from mavframecheck.geo import permutations
 from mavframecheck.geo.alignment import (
     Linear,
     linear_between,
+    rotation_between,
     trimmed_rms,
     yaw_between,
     yaw_matrix,
@@ -70,7 +71,7 @@ class Fit(NamedTuple):
     """How a stream lies against a reference."""
 
     kind: str
-    """``agrees``, ``vertical`` (z alone is reversed), ``permuted``, ``quarter``, ``turned``."""
+    """``agrees``, ``vertical`` (z alone is reversed), ``permuted``, ``quarter``, ``turned``, ``tilted``."""
     matrix: Floats
     """(3, 3) `stream_from_ned` that fits best."""
     says: str
@@ -138,6 +139,14 @@ def compare(stream: Series, reference: Series, frame: Frame) -> Fit | Undecided:
             return found
         why = found.why
     return Undecided(why)
+
+
+def compare_steps(
+    stream: Floats, reference: Floats, at: Floats, frame: Frame = NED
+) -> Fit | Undecided:
+    """Say the same of displacements, or velocities, (n, 3), that belong together and do not overlap."""
+    share = _explained(stream, reference)
+    return _judge(_Steps(stream, reference, at, 1.0, 1.0, 0.0, share), frame)
 
 
 def _moves(reference: Series) -> bool:
@@ -300,11 +309,24 @@ def _other(
     turned = [c @ yaw_matrix(_yaw(steps, c, scale)) for c in permutations.CLASSES]
     best = turned[int(np.argmin([_left(steps, matrix, scale) for matrix in turned]))]
     if seen.off(best) > FITS or not yaw_known:
-        return "undecided", best, "", ""
+        return _tilted(steps, frame, seen, scale) or ("undecided", best, "", "")
     proper = np.linalg.det(best) * np.linalg.det(frame.axes) > 0
     if proper and np.allclose(best[2], frame.axes[2]):
         return "turned", best, "", ""
     return _freely(frame, best)
+
+
+def _tilted(
+    steps: _Steps, frame: Frame, seen: _Directions, scale: float
+) -> tuple[str, Floats, str, str] | None:
+    """Return the same for axes that lean: a rotation that is neither a permutation nor about the vertical."""
+    matrix = rotation_between(steps.reference, steps.stream / scale)
+    label = frame.axes @ yaw_matrix(_yaw(steps, frame.axes, scale))
+    fits = seen.off(matrix) < FITS and len(seen.went) > 1
+    if not fits or _left(steps, matrix, scale) > CLEARLY * _left(steps, label, scale):
+        return None
+    lean = float(np.degrees(np.arccos(np.clip(matrix[2] @ frame.axes[2], -1.0, 1.0))))
+    return "tilted", matrix, f"its z leans by {lean:.0f} degrees", ""
 
 
 def _permuted(

@@ -182,22 +182,37 @@ class Vertical(_Axes):
         return fit.heights_known
 
 
-class _Poses(MotionCheck):
+class _Concluding(MotionCheck):
+    """A rule about some conclusions of the judge: any one of them suffices."""
+
+    aspects: tuple[str, ...] = ("lie",)
+    """Which ones: fields of `judge.Subject`."""
+
+    def concerns(self, subject: judging.Subject) -> bool:
+        """Return whether there is something to conclude from."""
+        return any(each != judging.NOTHING for each in self._found(subject))
+
+    def why_not(self, subject: judging.Subject) -> str:
+        """Return what was missing to tell."""
+        found = [each for each in self._found(subject) if each != judging.NOTHING]
+        reasons = [each for each in found if isinstance(each, str)]
+        return reasons[0] if reasons and len(reasons) == len(found) else ""
+
+    def _found(self, subject: judging.Subject) -> list[object]:
+        return [getattr(subject, aspect) for aspect in self.aspects]
+
+
+class _Poses(_Concluding):
     """A rule about the attitude in a pose."""
 
     lies: tuple[str, ...] = ()
-
-    def concerns(self, subject: judging.Subject) -> bool:
-        """Return whether a stream has an attitude."""
-        return subject.lie != judging.NOTHING
+    missing = "the vehicle hardly turns"
 
     def why_not(self, subject: judging.Subject) -> str:
         """Return what was missing to tell."""
         if isinstance(subject.lie, str):
             return subject.lie
         return "" if set(self.lies) <= subject.lie.told else self.missing
-
-    missing = "the vehicle hardly turns"
 
     def told(self, subject: judging.Subject) -> Values | None:
         """Return how the attitude is to be read; nothing where the whole pose is in other axes."""
@@ -333,12 +348,14 @@ class QuaternionOrder(_Poses):
         return Verdict(poses.checked + rows, partly=poses.partly) if rows else poses
 
 
-class BodyAxes(MotionCheck):
+class BodyAxes(_Concluding):
     """Attitudes, or velocities, of front-left-up axes."""
 
+    aspects = ("lie", "twist")
+
     def concerns(self, subject: judging.Subject) -> bool:
-        """Return whether a stream says something of the body."""
-        return subject.lie != judging.NOTHING or subject.twist != judging.NOTHING
+        """Return whether a stream says something of the body, and is no velocity alone."""
+        return super().concerns(subject) and not _speed_alone(subject)
 
     def why_not(self, subject: judging.Subject) -> str:
         """Return what was missing to tell."""
@@ -360,6 +377,10 @@ class BodyAxes(MotionCheck):
         if isinstance(turn, twist.Twist) and turn.kind == "flu":
             return {**twist_values(turn), "what": "velocity"}
         return None
+
+
+def _speed_alone(subject: judging.Subject) -> bool:
+    return subject.track.key.message == SpeedFrame.message
 
 
 def _euler(subject: judging.Subject) -> bool:
@@ -389,12 +410,35 @@ class PoseRotation(_Poses):
         return not _euler(subject)
 
 
-class VectorFrame(MotionCheck):
-    """Velocities that are in the axes of the world where the label says the body, and the reverse."""
+class SensorMount(_Concluding):
+    """Poses of a sensor that sits turned in the vehicle, as if they were the vehicle's."""
+
+    aspects = ("place", "lie")
 
     def concerns(self, subject: judging.Subject) -> bool:
-        """Return whether a stream has a velocity with a frame of its own."""
-        return subject.twist != judging.NOTHING
+        """Return whether a stream from outside has a position or an attitude."""
+        return super().concerns(subject) and not subject.by_autopilot
+
+    def told(self, subject: judging.Subject) -> Values | None:
+        """Return how the sensor lies."""
+        place, lie = subject.place, subject.lie
+        if isinstance(place, axes.Fit) and place.kind == "tilted":
+            return {**fit_values(place), "what": "position", "says": place.says}
+        if isinstance(lie, attitude.Lie) and lie.kind == "mount" and not in_other_axes(subject):
+            return {**lie_values(lie), "what": "attitude"}
+        return None
+
+
+class VectorFrame(_Concluding):
+    """Velocities that are in the axes of the world where the label says the body, and the reverse."""
+
+    aspects = ("twist",)
+    message = "ODOMETRY"
+    right: tuple[str, ...] = ("labelled", "flu")
+
+    def concerns(self, subject: judging.Subject) -> bool:
+        """Return whether a stream has a velocity of the kind that the rule is about."""
+        return super().concerns(subject) and subject.track.key.message == self.message
 
     def why_not(self, subject: judging.Subject) -> str:
         """Return what was missing to tell."""
@@ -407,9 +451,16 @@ class VectorFrame(MotionCheck):
     def told(self, subject: judging.Subject) -> Values | None:
         """Return which axes fit; nothing where the whole pose is in other axes."""
         turn = subject.twist
-        if isinstance(turn, str) or turn.kind in ("labelled", "flu") or in_other_axes(subject):
+        if isinstance(turn, str) or turn.kind in self.right or in_other_axes(subject):
             return None
         return twist_values(turn)
+
+
+class SpeedFrame(VectorFrame):
+    """Velocities from vision that are in the axes of the body."""
+
+    message = "VISION_SPEED_ESTIMATE"
+    right = ("labelled", "inverse", "enu")
 
 
 class EstimateScale(MotionCheck):

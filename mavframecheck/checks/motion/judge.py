@@ -134,6 +134,19 @@ class Judge:
             real = not int(table["param_type"][row]) <= 8 or float(value[0]).is_integer()
             self.parameters[key] = float(value[0] if real else value.view(np.int32)[0])
 
+    def tracks_of(self, message: str) -> list[Track]:
+        """Return the tracks of a message, of all senders."""
+        return [t for key, t in self._tracks.tracks.items() if key.message == message]
+
+    def role(self, sender: int) -> str:
+        """Return what a sender is: ``autopilot``..."""
+        return self._roles[sender]
+
+    @property
+    def t0_us(self) -> int | None:
+        """The receive time that those of tracks count from, us; None as long as there is none."""
+        return self._tracks.t0_us
+
     @property
     def timed(self) -> bool:
         """Whether there are receive times."""
@@ -167,7 +180,7 @@ class Judge:
             why = "its frame has no axes that could be compared"
             return Subject(track, system, own, axes.NED, "", why, why, why, why)
         truth = self._truth(system, track)
-        stream = self._series(track)
+        stream = self.series(track)
         reference = truth.place.message if truth.place is not None else ""
         judged = Subject(track, system, own, frame, reference, nothing, nothing, nothing, nothing)
         if track.key.message in POSES:
@@ -176,7 +189,7 @@ class Judge:
             judged = judged._replace(lie=self._lie(stream, truth, judged))
         if track.source.velocity is not None and track.key.message != "ODOMETRY":
             judged = judged._replace(speed=self._speed(stream, truth, frame))
-        if track.key.message == "ODOMETRY":
+        if track.key.message in ("ODOMETRY", "VISION_SPEED_ESTIMATE"):
             judged = judged._replace(twist=self._twist(stream, truth, judged))
         return judged
 
@@ -196,7 +209,8 @@ class Judge:
         told &= {b"VISO_TYPE", b"EKF2_EV_CTRL"}
         return subject.track.key.message == POSES[0] and not told
 
-    def _series(self, track: Track) -> Series:
+    def series(self, track: Track) -> Series:
+        """Return the samples of a track, made once."""
         if track.key not in self._cache:
             self._cache[track.key] = series_of(track)
         return self._cache[track.key]
@@ -205,7 +219,7 @@ class Judge:
     def _cache(self) -> dict[object, Series]:
         return {}
 
-    def _own(self, system: int, message: str) -> Track | None:
+    def own(self, system: int, message: str) -> Track | None:
         """Return the track of a message of a system's autopilot; the longest of several."""
         found = [
             track
@@ -218,12 +232,12 @@ class Judge:
 
     def _truth(self, system: int, subject: Track) -> _Truth:
         """Return what is independent of a stream."""
-        attitude = self._own(system, "ATTITUDE") or self._own(system, "ATTITUDE_QUATERNION")
+        attitude = self.own(system, "ATTITUDE") or self.own(system, "ATTITUDE_QUATERNION")
         place, why = self._place_of(system)
         if subject.key.message == "GLOBAL_POSITION_INT" and place is None:
-            place = self._series(subject)
-        lies = None if attitude is None else self._series(attitude)
-        return _Truth(place, why, lies, 1.0 if lies is None else _rate(lies))
+            place = self.series(subject)
+        lies = None if attitude is None else self.series(attitude)
+        return _Truth(place, why, lies, 1.0 if lies is None else rate_of(lies))
 
     def _place_of(self, system: int) -> tuple[Series | None, str]:
         """Return the position to compare with; or why there is none."""
@@ -238,14 +252,14 @@ class Judge:
         return {}
 
     def _find_place(self, system: int) -> tuple[Series | None, str]:
-        whole = self._own(system, "GLOBAL_POSITION_INT")
-        gnss = self._own(system, "GPS_RAW_INT")
-        truth = self._own(system, "SIMSTATE")
-        own = None if whole is None else self._series(whole)
+        whole = self.own(system, "GLOBAL_POSITION_INT")
+        gnss = self.own(system, "GPS_RAW_INT")
+        truth = self.own(system, "SIMSTATE")
+        own = None if whole is None else self.series(whole)
         for witness in (gnss, truth):
             if witness is None:
                 continue
-            seen = self._series(witness)
+            seen = self.series(witness)
             if own is not None and _confirms(seen, own):
                 return own, ""
             if witness is gnss and len(seen.t) > 20:
@@ -286,21 +300,24 @@ class Judge:
             return "no ATTITUDE of the vehicle"
         since = 0.0 if truth.place is None else _first_move(truth.place)
         fit = judged.place
-        delay = fit.delay_s if isinstance(fit, axes.Fit) and fit.delay_known else None
+        known = isinstance(fit, axes.Fit) and fit.delay_known
+        delays = (
+            np.array([fit.delay_s]) if isinstance(fit, axes.Fit) and known else attitudes.DELAYS_S
+        )
         return attitudes.compare(
             stream,
             truth.attitude,
             free_heading=judged.frame.free_heading,
             since_s=since,
-            delay_s=delay,
+            delays=delays,
         )
 
     def _twist(self, stream: Series, truth: _Truth, judged: Subject) -> twist.Twist | str:
-        child = judged.track.key.variant[1]
+        world, child = judged.track.key.variant or (_frame("LOCAL_NED"),) * 2
         body = child in (_frame("BODY_FRD"), _frame("BODY_NED"))
         if truth.place is None or truth.attitude is None:
             return truth.why or "no ATTITUDE of the vehicle"
-        if not body and child != judged.track.key.variant[0]:
+        if not body and child != world:
             return "its child frame has no axes that could be compared"
         fit = judged.place
         known = isinstance(fit, axes.Fit) and fit.yaw_known
@@ -319,7 +336,7 @@ class Judge:
         )
 
 
-def _rate(series: Series) -> float:
+def rate_of(series: Series) -> float:
     """Return seconds of the stamps per second of receive time."""
     good = np.isfinite(series.stamp)
     t, stamp = series.t[good], series.stamp[good]

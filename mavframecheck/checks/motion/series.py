@@ -77,6 +77,11 @@ class Series:
         turned = quaternions.between(share, q[k], q[k + 1])
         return np.where(near[:, np.newaxis], turned, np.nan)
 
+    def where(self, rows: Bools) -> Series:
+        """Return some of the samples."""
+        columns = (self.t, self.place, self.attitude, self.velocity, self.stamp)
+        return Series(self.message, *(each[rows] for each in columns))
+
     def steps(self, at: Floats, span_s: float) -> Floats:
         """Return (k, 3) how far it went in the `span_s` around times `at`, m, NaN across gaps."""
         went = self.places(at + span_s / 2) - self.places(at - span_s / 2)

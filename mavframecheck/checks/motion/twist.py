@@ -31,7 +31,7 @@ class Twist(NamedTuple):
     """How a velocity is to be read."""
 
     kind: str
-    """``labelled``, ``world``, ``body``, ``inverse``, ``flu`` or ``enu``."""
+    """``labelled``, ``world``, ``body``, ``level``, ``inverse``, ``flu`` or ``enu``."""
     says: str
     left_mps: float
     labelled_mps: float
@@ -44,6 +44,7 @@ class Twist(NamedTuple):
 _SAYS = {
     "world": "the velocity is in the axes of the world",
     "body": "the velocity is in the axes of the body",
+    "level": "the velocity is in the axes of the body",
     "inverse": "the velocity was turned the wrong way (from the body to the world twice over)",
     "flu": "the velocity is in front-left-up axes",
     "enu": "the velocity is in east-north-up axes",
@@ -103,13 +104,14 @@ def _choose(
     off = {name: np.linalg.norm(v - true, axis=1) for name, v in readings.items()}
     left = {name: trimmed_rms(each, 0.95) for name, each in off.items()}
     best = min(left, key=lambda name: left[name])
-    fine = left[label] < FITS * speed or left["level"] < max(FITS * speed, 1.2 * left[best])
+    same = (label, "level") if label == "body" else (label,)  # axes of the heading are of the body
+    fine = any(left[name] < max(FITS * speed, 1.2 * left[best]) for name in same[1:])
     told = frozenset(
         name for name in readings if _differ(readings[name], readings[label], FITS * speed)
     )
     if left[best] > FITS * speed:
         return "the velocity follows the vehicle in no axes"
-    if best in (label, "level") or fine:
+    if best in same or left[label] < FITS * speed or fine:
         return Twist("labelled", "", left[label], left[label], len(true) * GRID_S, times, told)
     differ = np.linalg.norm(readings[best] - readings[label], axis=1) > MIN_MPS
     if np.count_nonzero(differ) < MIN_TELLING:
