@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from mavframecheck.checks import load_check
 from mavframecheck.engine.compiled import CompiledRule, Pack
 from mavframecheck.engine.pack import chosen_rules
 from mavframecheck.engine.reading import Progress, Reading
-from mavframecheck.engine.runner import Runner
+from mavframecheck.engine.runner import Onlooker, Runner
 from mavframecheck.engine.settings import Settings
 from mavframecheck.missions import read_mission
 from mavframecheck.missions.upload import ITEM, Upload
@@ -15,6 +17,9 @@ from mavframecheck.semantics.names import family, type_name
 from mavframecheck.sources import MISSIONS, RECORDINGS, Recording, open_recording
 from mavframecheck.vehicle import Context
 from mavframecheck.wire import Dialect, load_dialect
+
+if TYPE_CHECKING:
+    from mavframecheck.model.trace import Detail
 
 
 def check_file(
@@ -40,9 +45,56 @@ def check_recording(
     progress: Progress | None = None,
 ) -> tuple[FileReport, tuple[Finding, ...]]:
     """Judge an open recording."""
+    report, findings, _ = _judged(recording, pack, settings, dialect, progress)
+    return report, findings
+
+
+def draw_file(
+    path: str, pack: Pack, settings: Settings, progress: Progress | None = None
+) -> tuple[FileReport, tuple[Finding, ...], Detail | None]:
+    """Judge like `check_file`, and keep what a report that draws shows besides; of a mission file, nothing."""
+    dialect = load_dialect(settings.dialect)
+    with open_recording(path, settings.input_kind, RECORDINGS | MISSIONS) as recording:
+        if recording.kind in MISSIONS:
+            return *check_mission(recording, pack, settings, dialect), None
+        return draw_recording(recording, pack, settings, dialect, progress)
+
+
+def draw_recording(
+    recording: Recording,
+    pack: Pack,
+    settings: Settings,
+    dialect: Dialect,
+    progress: Progress | None = None,
+) -> tuple[FileReport, tuple[Finding, ...], Detail]:
+    """Judge an open recording, and keep what a report that draws shows besides."""
+    from mavframecheck.engine.detail import Gatherer
+
+    gatherer = Gatherer(recording)
+    judged = _judged(recording, pack, settings, dialect, progress, gatherer)
+    report, findings, (reading, runner) = judged
+    figures = runner.figures()
+    return report, findings, gatherer.detail(reading, findings, figures, settings, dialect)
+
+
+def _judged(
+    recording: Recording,
+    pack: Pack,
+    settings: Settings,
+    dialect: Dialect,
+    progress: Progress | None,
+    onlooker: Onlooker | None = None,
+) -> tuple[FileReport, tuple[Finding, ...], tuple[Reading, Runner]]:
     reading = Reading(recording, settings, dialect)
     rules = chosen_rules(pack, settings)
-    runner = Runner(recording.name, rules, reading.context, dialect, only=settings.sender)
+    runner = Runner(
+        recording.name,
+        rules,
+        reading.context,
+        dialect,
+        only=settings.sender,
+        onlooker=onlooker,
+    )
     for batch in reading.batches(progress):
         runner.update(batch)
     findings, runs = runner.finish()
@@ -53,7 +105,7 @@ def check_recording(
         damage_total=reading.damage_total,
         runs=tuple(runs),
     )
-    return report, tuple(findings)
+    return report, tuple(findings), (reading, runner)
 
 
 def check_mission(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,9 @@ from mavframecheck.model import (
     Subject,
 )
 from mavframecheck.wire import Frames
+
+if TYPE_CHECKING:
+    from mavframecheck.model.trace import Figure
 
 MAX_EPISODES = 50
 """Episodes per rule and stream; what comes after counts into the last one."""
@@ -70,6 +74,8 @@ class Judged(NamedTuple):
     """Words for the hit at a place."""
     timeless: bool = False
     """Whether nothing says how far apart rows are: then a row that is right ends an episode."""
+    figures: Callable[[int], tuple[Figure, ...]] = lambda _: ()
+    """Drawings of a stream, once the recording is read."""
 
 
 @dataclass(slots=True)
@@ -87,6 +93,8 @@ class Episode:
     """Rows judged from the first hit to the last."""
     since: int = 0
     """Rows judged and found right since the last hit."""
+    figures: Callable[[], tuple[Figure, ...]] = tuple
+    """Draws what proves it."""
 
     @property
     def lasts(self) -> bool:
@@ -143,13 +151,17 @@ class Episodes:
         self._observed.append(episode)
 
     def findings(self) -> list[Finding]:
-        """Return the findings of all episodes that last, in order of their first frame."""
+        """Return the findings of all episodes that last."""
+        return [_finding(e, self._file, self._locate) for e in self.lasting()]
+
+    def lasting(self) -> list[Episode]:
+        """Return all episodes that last, in order of their first frame."""
         collected = [
             e for group in self._streams.values() for s in group.values() for e in s.episodes
         ]
         lasting = [e for e in (*collected, *self._observed) if e.lasts]
         lasting.sort(key=lambda e: (e.first.number, e.rule.rule.code, str(e.subject)))
-        return [_finding(e, self._file, self._locate) for e in lasting]
+        return lasting
 
 
 def _extend(stream: _Stream, rule: CompiledRule, judged: Judged, places: Ints) -> None:
@@ -216,6 +228,7 @@ def _add_run(
             badness=badness,
             count=len(hits),
             judged=length,
+            figures=functools.partial(judged.figures, int(judged.stream[hits[0]])),
         )
     )
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -18,6 +20,19 @@ from mavframecheck.model import Evidence, Finding, RuleRun, Scalar, Severity, Su
 from mavframecheck.vehicle import NAMES, Context
 from mavframecheck.vehicle.rows import Rows
 from mavframecheck.wire import Batch, Dialect
+
+if TYPE_CHECKING:
+    from mavframecheck.engine.proofs import Proofs
+    from mavframecheck.model.trace import Figure
+
+
+class Onlooker(Protocol):
+    """Who watches a recording being judged, for reports that draw."""
+
+    proofs: Proofs
+
+    def update(self, batch: Batch, context: Context) -> None:
+        """See a batch, before its context is forgotten."""
 
 
 @dataclass(slots=True)
@@ -89,11 +104,13 @@ class Runner:
         *,
         upload: Upload | None = None,
         only: int | None = None,
+        onlooker: Onlooker | None = None,
     ) -> None:
         """Judge the recording called `file` with `rules`, learning `context` on the way.
 
         With `upload` the file is a mission: only its items are judged, and findings are placed in its text.
         With `only`, judge what that sender says, and learn from everybody.
+        The `onlooker` sees every batch with its context, and keeps what rules draw.
         """
         self._rules = [rule for rule in rules if not rule.rule.detect.check]
         self._checks: list[tuple[CompiledRule, Check]] = [
@@ -105,6 +122,7 @@ class Runner:
             check.only = only
         self._only = only
         self._context = context
+        self._onlooker = onlooker
         self._episodes = Episodes(file, upload.locate if upload is not None else None)
         self._judged = None if upload is None else {ITEM}
         self._halls: dict[str, list[_Hall]] = {}
@@ -125,6 +143,8 @@ class Runner:
                     self._serve(desk, admitted, batch)
         for _, check in self._checks:
             check.update(batch, self._context)
+        if self._onlooker is not None:
+            self._onlooker.update(batch, self._context)
         self._context.settle()
 
     def finish(self) -> tuple[list[Finding], list[RuleRun]]:
@@ -135,7 +155,8 @@ class Runner:
         for rule, check in self._checks:
             for observation in check.finish():
                 if self._concerns(observation.subject):
-                    self._episodes.observe(_episode(rule, observation))
+                    figures = functools.partial(check.figures, observation)
+                    self._episodes.observe(_episode(rule, observation, figures))
             runs.append(_verdict_of(rule, check))
         return self._episodes.findings(), sorted(runs, key=lambda run: run.code)
 
@@ -144,6 +165,10 @@ class Runner:
         if self._only is None:
             return True
         return (subject.sysid, subject.compid) == (self._only >> 8, self._only & 0xFF)
+
+    def figures(self) -> list[tuple[Figure, ...]]:
+        """Return what proves each finding, once all is finished."""
+        return [episode.figures() for episode in self._episodes.lasting()]
 
     def _halls_for(self, message: str) -> list[_Hall]:
         """Return the rules on a message by whom they listen to."""
@@ -189,6 +214,10 @@ class Runner:
             if not inside.any():
                 continue
             looked[place] |= inside
+            if self._onlooker is not None and rule.rule.proof:
+                self._onlooker.proofs.record(
+                    rule, scope, (rows.table.name, label), rows.stream[place], inside
+                )
             found = inside & rule.flag(scope)
             if not found.any():
                 continue
@@ -236,8 +265,16 @@ class Runner:
             badness[places],
             subject,
             describe,
+            figures=functools.partial(self._figures_of, rule, (rows.table.name, label)),
         )
         self._episodes.collect(rule, rows.table.name, label, judged)
+
+    def _figures_of(
+        self, rule: CompiledRule, key: tuple[str, str | None], stream: int
+    ) -> tuple[Figure, ...]:
+        if self._onlooker is None:
+            return ()
+        return self._onlooker.proofs.figures(rule, key, stream)
 
     def _judge_ready(self, desk: _Desk, rows: Rows | None) -> None:
         """Judge rows; where context never came, those that a rule can judge without. Count the others."""
@@ -325,7 +362,9 @@ def _evidence(
         yield key, template.value(scope)
 
 
-def _episode(rule: CompiledRule, observation: Observation) -> Episode:
+def _episode(
+    rule: CompiledRule, observation: Observation, figures: Callable[[], tuple[Figure, ...]]
+) -> Episode:
     """Return an observation of a Python check as an episode."""
     values = {
         name: plain(value) if value is not None else None
@@ -341,6 +380,7 @@ def _episode(rule: CompiledRule, observation: Observation) -> Episode:
         words=words._replace(evidence=evidence),
         count=observation.times,
         judged=observation.times,
+        figures=figures,
     )
 
 
