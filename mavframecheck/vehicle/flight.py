@@ -18,7 +18,7 @@ from mavframecheck.semantics.tags import FieldTag
 from mavframecheck.vehicle.context import Context
 from mavframecheck.vehicle.facts import SOURCES as SAID
 from mavframecheck.vehicle.rows import Rows
-from mavframecheck.vehicle.thinning import Series, thinned
+from mavframecheck.vehicle.thinning import MAX_BINS, Series, thinned
 from mavframecheck.vehicle.tracks import SOURCES as TRACKED
 from mavframecheck.wire import Batch, Frames, Table
 
@@ -173,10 +173,17 @@ class FlightBook:
         yield from best.values()
 
 
-def line(label: str, t: Floats, y: Floats, role: str = "", x: Floats | None = None) -> Trace:
+def line(
+    label: str,
+    t: Floats,
+    y: Floats,
+    role: str = "",
+    x: Floats | None = None,
+    most: int = MAX_BINS,
+) -> Trace:
     """Return (n,) values over (n,) times, ascending, as a trace: thinned out where there are many."""
     columns = [y] if x is None else [y, x]
-    t, rows = thinned(t, np.column_stack(columns))
+    t, rows = thinned(t, np.column_stack(columns), most)
     east = None if x is None else tuple(rows[:, 1].tolist())
     return Trace(label=label, role=role, t=tuple(t.tolist()), y=tuple(rows[:, 0].tolist()), x=east)
 

@@ -236,7 +236,8 @@ class Tracks:
         self.tracks: dict[TrackKey, Track] = {}
         self.timed = False
         """Whether there were receive times that can be believed."""
-        self._t0_us: int | None = None
+        self.t0_us: int | None = None
+        """The first receive time that can be believed: times count from it."""
         self._level = 0
 
     def update(self, batch: Batch) -> None:
@@ -248,8 +249,8 @@ class Tracks:
 
     def _streams(self, batch: Batch) -> Iterator[tuple[TrackKey, Table]]:
         frames = batch.frames
-        if self._t0_us is None and frames.t_valid.any():
-            self._t0_us = int(frames.t_us[np.argmax(frames.t_valid)])
+        if self.t0_us is None and frames.t_valid.any():
+            self.t0_us = int(frames.t_us[np.argmax(frames.t_valid)])
             self.timed = True
         for name in batch.tables.keys() & SOURCES.keys():
             table = batch.tables[name]
@@ -267,7 +268,7 @@ class Tracks:
                 return
             at = seen(table.frames, 0)
             track = self.tracks[key] = Track(key, SOURCES[key.message], at, at)
-        since = table.frames.t_us - (self._t0_us or 0)
+        since = table.frames.t_us - (self.t0_us or 0)
         bins = np.maximum(since // BIN_US, 0)
         while int(bins.max()) // WINDOW_BINS >> self._level >= MAX_WINDOWS:
             self._level += 1
