@@ -15,7 +15,7 @@ from typing import BinaryIO, NoReturn
 import click
 
 from mavframecheck import __version__
-from mavframecheck.report import FILE_WIDTH, FORMATS, Checked, Context, Piece, load
+from mavframecheck.report import DRAWN, FILE_WIDTH, FORMATS, Checked, Context, Piece, load
 from mavframecheck.report.escape import sentence
 
 CLOSED_PIPE = 141
@@ -89,6 +89,8 @@ def deliver(
     """
     with ExitStack() as stack:
         files = [(each, stack.enter_context(_opened(path))) for each, path in outputs]
+        for drawn in (path for each, path in outputs if each in DRAWN):
+            results = _drawing(results, drawn, context.for_a_file())
         first, *copies = tee(results, len(files) + 1)
         closed = None
         try:
@@ -96,9 +98,21 @@ def deliver(
         except click.exceptions.Exit as left:
             closed = left
         for (each, file), copy in zip(files, copies):
-            _write(file, load(each)(copy, context.for_a_file()))
+            if each not in DRAWN:
+                _write(file, load(each)(copy, context.for_a_file()))
         if closed:
             raise closed
+
+
+def _drawing(results: Iterable[Checked], path: Path, context: Context) -> Iterator[Checked]:
+    """Yield `results`, and write pages to `path` meanwhile: what is drawn of all of them is too much to keep."""
+    from mavframecheck.report.html import write
+
+    try:
+        yield from write(results, path, context)
+    except OSError as error:
+        complain(sentence(f"{error.filename}: cannot write the report: {error.strerror}"))
+        raise click.exceptions.Exit(2) from error
 
 
 def _opened(path: Path) -> BinaryIO:
