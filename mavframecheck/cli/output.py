@@ -88,9 +88,9 @@ def deliver(
     closed on the way.
     """
     with ExitStack() as stack:
-        files = [(each, stack.enter_context(_opened(path))) for each, path in outputs]
+        files = [(each, stack.enter_context(opened(path))) for each, path in outputs]
         for drawn in (path for each, path in outputs if each in DRAWN):
-            results = _drawing(results, drawn, context.for_a_file())
+            results = drawing(results, drawn, context.for_a_file())
         first, *copies = tee(results, len(files) + 1)
         closed = None
         try:
@@ -104,7 +104,7 @@ def deliver(
             raise closed
 
 
-def _drawing(results: Iterable[Checked], path: Path, context: Context) -> Iterator[Checked]:
+def drawing(results: Iterable[Checked], path: Path, context: Context) -> Iterator[Checked]:
     """Yield `results`, and write pages to `path` meanwhile: what is drawn of all of them is too much to keep."""
     from mavframecheck.report.html import write
 
@@ -115,7 +115,8 @@ def _drawing(results: Iterable[Checked], path: Path, context: Context) -> Iterat
         raise click.exceptions.Exit(2) from error
 
 
-def _opened(path: Path) -> BinaryIO:
+def opened(path: Path) -> BinaryIO:
+    """Return a file to write a report to; one that cannot be written is a usage error."""
     try:
         return path.open("wb")
     except OSError as error:

@@ -74,7 +74,7 @@ class Proofs:
             if wanted in drawn:
                 t, values = drawn[wanted]
                 traces = tuple(
-                    line(label, t, values[:, place], "" if place else "claimed")
+                    line(label, t, values[:, place], "" if place or k else "claimed")
                     for place, label in enumerate(lines)
                 )
                 found.append(

@@ -102,7 +102,9 @@ def _point(kind: Literal["home", "origin", "launch"], entry: Home | Origin | Lau
     return Point(
         kind=kind,
         label=f"{kind} of {entry.system}",
+        system=entry.system,
         lat=np.nan if at is None else at.lat,
         lon=np.nan if at is None else at.lon,
+        alt_msl=np.nan if at is None else at.alt_msl,
         time=None if t_us is None else t_us * 1e-6,
     )

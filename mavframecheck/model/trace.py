@@ -85,9 +85,12 @@ class Point(msgspec.Struct, frozen=True, kw_only=True):
 
     kind: Literal["home", "origin", "launch"]
     label: str
+    system: int
     lat: float
     """deg"""
     lon: float
+    alt_msl: float
+    """m"""
     time: float | None
     """As `Trace.t`."""
 

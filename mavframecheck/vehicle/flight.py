@@ -210,4 +210,7 @@ def _height(rows: Rows, tag: FieldTag) -> Floats:
         height = np.where(tracked.valid(rows.table), height, np.nan)
     if tag.alt_ref == "ellipsoid":
         height = np.where(height == 0, np.nan, height)
+    if tag.message == "TERRAIN_REPORT":
+        given = (rows.raw("spacing") != 0) & (rows.raw("lat") != 0) & (rows.raw("lon") != 0)
+        height = np.where(given, height, np.nan)
     return height[:, np.newaxis]

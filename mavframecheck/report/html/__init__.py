@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from urllib.parse import quote
 
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.html.index import Entry, index
@@ -17,11 +18,11 @@ from mavframecheck.report.html.page import page
 def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
     """Yield the page of the only recording; of several, an index without pages."""
     entries: list[Entry] = []
-    only = None
-    for number, checked in enumerate(results):
-        entries.append(Entry.of(checked, None))
-        only = page(checked, context) if not number else None
-    yield only if only is not None else index(entries, context)
+    only = ""
+    for checked in results:
+        entries.append(Entry.of(checked))
+        only = page(checked, context) if len(entries) == 1 else ""
+    yield only or index(entries, context)
 
 
 def write(results: Iterable[Checked], path: Path, context: Context) -> Iterator[Checked]:
@@ -32,30 +33,30 @@ def write(results: Iterable[Checked], path: Path, context: Context) -> Iterator[
     """
     entries: list[Entry] = []
     first = ""
-    for number, checked in enumerate(results):
-        if not number:
-            first = page(checked, context)
-            entries.append(Entry.of(checked, None))
+    for checked in results:
+        entries.append(Entry.of(checked))
+        text = page(checked, context)
+        if len(entries) == 1:
+            first = text
         else:
-            if number == 1:
-                entries[0] = _add(first, entries[0], 0, path, context)
-            entries.append(
-                _add(page(checked, context), Entry.of(checked, None), number, path, context)
-            )
+            if len(entries) == 2:
+                entries[0] = _place(first, entries[0], 1, path)
+            entries[-1] = _place(text, entries[-1], len(entries), path)
         yield checked._replace(detail=None)
-    _write(path, first if len(entries) == 1 else index(entries, context))
+    _save(path, first if len(entries) == 1 else index(entries, context))
 
 
-def _add(text: str, entry: Entry, number: int, path: Path, context: Context) -> Entry:
-    """Write one of several pages; return its entry with a link."""
+def _place(text: str, entry: Entry, number: int, path: Path) -> Entry:
+    """Write one of several pages; return its entry with the link to it."""
     folder = path.with_suffix("")
+    if folder == path:
+        folder = path.with_name(f"{path.name}-pages")
     folder.mkdir(exist_ok=True)
-    stem = "".join(c if c.isalnum() and c.isascii() else "-" for c in Path(entry.path).stem)[:60]
-    name = f"{number + 1:03d}-{stem}.html"
-    _write(folder / name, text)
-    _ = context
-    return entry._replace(link=f"{folder.name}/{name}")
+    stem = "".join(c if c.isascii() and c.isalnum() else "-" for c in Path(entry.path).stem)
+    name = f"{number:03d}-{stem[:60]}.html"
+    _save(folder / name, text)
+    return entry._replace(link=quote(f"{folder.name}/{name}"))
 
 
-def _write(path: Path, text: str) -> None:
+def _save(path: Path, text: str) -> None:
     path.write_text(text, "utf-8", newline="\n")

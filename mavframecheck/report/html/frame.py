@@ -10,9 +10,19 @@ from typing import Any
 
 import jinja2
 import msgspec
-from markupsafe import Markup
 
 from mavframecheck.report.escape import terminal
+
+
+class Trusted(str):
+    """Text that templates do not escape: our own, or made harmless."""
+
+    __slots__ = ()
+
+    def __html__(self) -> str:
+        """Return the text as it is."""
+        return self
+
 
 _HERE = files("mavframecheck.report.html") / "data"
 
@@ -31,17 +41,16 @@ def fill(
         f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; "
         "img-src data:; base-uri 'none'; form-action 'none'"
     )
-    return _templates().get_template(template).render(
-        policy=policy, script=Markup(script), style=Markup(style), data=inline(data), **values
-    )  # fmt: skip
+    trusted = {"script": Trusted(script), "style": Trusted(style), "data": inline(data)}
+    return _templates().get_template(template).render(policy=policy, **trusted, **values)
 
 
-def inline(data: dict[str, Any]) -> Markup:
+def inline(data: dict[str, Any]) -> Trusted:
     """Return JSON that ends no script element, whatever texts are in it."""
     text = msgspec.json.encode(data).decode()
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
-    return Markup(text)
+    return Trusted(text)
 
 
 @functools.cache
@@ -59,7 +68,7 @@ def _templates() -> jinja2.Environment:
 
 def _visible(value: Any) -> Any:
     """Return a text with every character that is no visible one as an escape; lines may end."""
-    if isinstance(value, Markup) or not isinstance(value, str):
+    if hasattr(value, "__html__") or not isinstance(value, str):
         return value
     return "\n".join(terminal(line) for line in value.split("\n"))
 

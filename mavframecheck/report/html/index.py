@@ -35,15 +35,15 @@ class Entry(NamedTuple):
     """Bytes that belong to no good frame."""
 
     @classmethod
-    def of(cls, checked: Checked, link: str | None) -> Self:
-        """Return the row of a recording."""
+    def of(cls, checked: Checked) -> Self:
+        """Return the row of a recording, without a link."""
         file = checked.file
         counts = Counter(finding.severity for finding in checked.findings)
         worst_first = sorted(checked.findings, key=lambda each: -each.severity.rank)
         autopilots = [component(v) for v in file.vehicles if v.role == "autopilot"]
         return cls(
             path=sentence(file.path),
-            link=link,
+            link=None,
             errors=counts[Severity.ERROR],
             warnings=counts[Severity.WARNING],
             infos=counts[Severity.INFO],
@@ -58,6 +58,12 @@ class Entry(NamedTuple):
         )
 
 
+def _common(paths: Sequence[str]) -> str:
+    """Return the folder that all recordings lie in, with its separator; empty where they lie apart."""
+    folders = {path[: max(path.rfind("/"), path.rfind("\\")) + 1] for path in paths}
+    return folders.pop() if len(folders) == 1 else ""
+
+
 def index(entries: Sequence[Entry], context: Context) -> str:
     """Return the page that lists recordings."""
     counts = Counter(
@@ -67,6 +73,7 @@ def index(entries: Sequence[Entry], context: Context) -> str:
             Severity.INFO: sum(each.infos for each in entries),
         }
     )
+    folder = _common([each.path for each in entries])
     wrong = sum(bool(each.errors or each.warnings) for each in entries)
     total = plural(len(entries), "recording")
     return fill(
@@ -75,6 +82,7 @@ def index(entries: Sequence[Entry], context: Context) -> str:
         styles=("page.css",),
         data={},
         title=total,
+        folder=folder,
         verdict=f"{wrong} of {total} with errors or warnings: {found(+counts)}.",
         counts={each.value: counts[each] for each in Severity},
         entries=sorted(entries, key=lambda e: (-e.errors, -e.warnings, -e.infos, e.path)),

@@ -38,7 +38,8 @@ def rows(survey: FileSurvey) -> list[Row]:
 
 
 def _rows(survey: FileSurvey) -> Iterator[Row]:
-    labels = {each.name: each.label for each in (*survey.references, *survey.heights)}
+    labels = {each.name: each.label for each in survey.references}
+    labels |= {each.name: each.label for each in survey.heights}
     for sender in survey.senders:
         who = f"{sender.sysid}/{sender.compid}"
         for stream in sender.streams:

@@ -14,7 +14,7 @@ from mavframecheck.model import ByteLocation, FileReport, Finding, Rule, Severit
 from mavframecheck.model.trace import Detail, Figure, Flight, FrameBytes, Proof, Trace
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.escape import sentence
-from mavframecheck.report.html import curves, meaning
+from mavframecheck.report.html import curves, heights, meaning
 from mavframecheck.report.html.frame import fill
 from mavframecheck.report.html.plan import Mark, Path, plan
 from mavframecheck.report.told import evidence_rows, when
@@ -197,14 +197,20 @@ def flight_plan(flight: Flight) -> Markup | None:
     lat0, lon0 = _centre(flight, known)
     to_m = functools.partial(_metres, lat0=lat0, lon0=lon0)
     paths = [
-        Path(f"{t.label} ({t.role})", t.role, *to_m(t.y, t.x or ()), t.role in _MUST, t.role in _DOTS)
+        Path(
+            f"{t.label} ({t.role})", t.role, *to_m(t.y, t.x or ()), t.role in _MUST, t.role in _DOTS
+        )
         for t in known
     ]
+    several = len({point.system for point in flight.points}) > 1
     marks = []
-    for point in {(p.kind, round(p.lat, 6), round(p.lon, 6)): p for p in flight.points}.values():
-        east, north = to_m((point.lat,), (point.lon,))
+    for kind, label, lat, lon in dict.fromkeys(
+        (p.kind, p.label if several else p.kind, round(p.lat, 6), round(p.lon, 6))
+        for p in flight.points
+    ):
+        east, north = to_m((lat,), (lon,))
         if np.isfinite(east).all():
-            marks.append(Mark(point.kind, point.label, float(east[0]), float(north[0])))
+            marks.append(Mark(kind, label, float(east[0]), float(north[0])))
     return plan(paths, marks, 1100, 620, "Where the vehicles were, seen from above, north up")
 
 
@@ -228,9 +234,7 @@ def _metres(
     return east, north
 
 
-def _data(
-    detail: Detail | None, cards: Sequence[Card], start: float, most: int
-) -> dict[str, Any]:
+def _data(detail: Detail | None, cards: Sequence[Card], start: float, most: int) -> dict[str, Any]:
     """Return what the scripts of the page draw."""
     drawn = {
         key: curves.figure(figure, start, max(most // 3, 60))
@@ -252,7 +256,7 @@ def _data(
     flown: dict[str, Any] = {"heights": [], "boots": [], "bands": []}
     if detail is not None:
         flight = detail.flight
-        flown["heights"] = [curves.curve(t, start, most) for t in flight.heights]
+        flown["heights"] = heights.curves_of(flight, start, most)
         flown["boots"] = [curves.curve(t, start, most // 2) for t in flight.boots]
         flown["bands"] = [
             {

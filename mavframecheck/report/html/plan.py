@@ -22,8 +22,12 @@ FAR = 6.0
 LEAST_M = 20.0
 """A map shows at least so much, m."""
 _BAR_SHARE = 0.22
+_ARROW_AT, _SHORTEST = 0.3, 60.0
+"""Where on a line its direction is shown (share of its length), and from what length on."""
 _MARGIN = 0.08
 _MOST_MARKS = 40
+_APART = 14.0
+"""Marks nearer to each other on the drawing are one."""
 
 
 class Path(NamedTuple):
@@ -64,7 +68,9 @@ class _View(NamedTuple):
         return np.asarray(self.height / 2 - (np.asarray(north) - self.north) * self.per_m)
 
 
-def plan(paths: Sequence[Path], marks: Sequence[Mark], width: int, height: int, title: str) -> Markup:
+def plan(
+    paths: Sequence[Path], marks: Sequence[Mark], width: int, height: int, title: str
+) -> Markup:
     """Return a map of `paths` and `marks`, `width` by `height`."""
     view = _view(paths, marks, width, height)
     parts = [
@@ -73,7 +79,7 @@ def plan(paths: Sequence[Path], marks: Sequence[Mark], width: int, height: int, 
         )
         + Markup(' data-per-m="{}" tabindex="0">').format(f"{view.per_m:.9g}"),
         *(part for path in paths for part in _path(path, view)),
-        *(_mark(mark, view) for mark in marks[:_MOST_MARKS] if _near(mark, view)),
+        *(_mark(mark, view) for mark in _merged(marks, view)),
         *_bar(view),
         _NORTH.format(x=width - 26),
         Markup("</svg>"),
@@ -129,9 +135,23 @@ def _path(path: Path, view: _View) -> Iterator[Markup]:
         shape = _line(x, y, inside)
     if shape:
         yield Markup('<path class="{}" d="{}">{}</path>').format(css, shape, title)
+    if not path.dots:
+        yield from _direction(path, x[inside], y[inside])
     far = np.flatnonzero(known & outside)
     if len(far):
         yield _arrow(path, view, int(far[0]))
+
+
+def _direction(path: Path, x: Floats, y: Floats) -> Iterator[Markup]:
+    """Yield an arrowhead early on a line: which way it goes."""
+    gone = np.cumsum(np.hypot(np.diff(x), np.diff(y)))
+    if not len(gone) or gone[-1] < _SHORTEST:
+        return
+    k = int(np.searchsorted(gone, _ARROW_AT * gone[-1]))
+    turn = math.degrees(math.atan2(y[k + 1] - y[k], x[k + 1] - x[k]))
+    yield Markup(
+        '<path class="way {}" d="M6 0L-5 5L-5 -5z" transform="translate({} {}) rotate({})"/>'
+    ).format(path.role, f"{x[k]:.1f}", f"{y[k]:.1f}", f"{turn:.0f}")
 
 
 def _line(x: Floats, y: Floats, inside: npt.NDArray[np.bool_]) -> str:
@@ -165,6 +185,20 @@ def _arrow(path: Path, view: _View, place: int) -> Markup:
         ty=f"{y + 30 if y < view.height / 2 else y - 22:.1f}",
         text=text,
     )
+
+
+def _merged(marks: Sequence[Mark], view: _View) -> list[Mark]:
+    """Return the marks inside the view; those that lie on each other as one with both names."""
+    merged: list[Mark] = []
+    for mark in (each for each in marks if _near(each, view)):
+        for k, other in enumerate(merged):
+            if math.hypot(mark.east - other.east, mark.north - other.north) * view.per_m < _APART:
+                names = dict.fromkeys([*other.label.split(", "), mark.label])
+                merged[k] = other._replace(label=", ".join(names))
+                break
+        else:
+            merged.append(mark)
+    return merged[:_MOST_MARKS]
 
 
 def _near(mark: Mark, view: _View) -> bool:

@@ -134,9 +134,11 @@
       value: (_, value) => (value === null || value === undefined ? "" : Number(value.toPrecision(6)).toString()),
     };
   }
-  function plot(element, series, unit, width, height, more = {}) {
+  function aligned(series) {
     const tables = series.map((each) => [each.t, each.y]);
-    const data = tables.length ? uPlot.join(tables, tables.map(() => [0, 1])) : [[]];
+    return tables.length ? uPlot.join(tables) : [[]];
+  }
+  function plot(element, series, unit, width, height, more = {}) {
     const axis = { stroke: () => colour("faint"), grid: { stroke: () => colour("rule"), width: 1 }, ticks: { show: false } };
     return new uPlot({
       width, height,
@@ -145,11 +147,11 @@
       cursor: { drag: { x: true, y: false, setScale: true }, points: { size: 7 } },
       series: [{ label: "time", value: (_, t) => say(t) }, ...series.map(drawn)],
       axes: [
-        { ...axis, space: 90, values: (_, ticks) => ticks.map((t) => say(t, ticks[1] - ticks[0] || 1)) },
+        { ...axis, space: 90, size: 34, values: (_, ticks) => ticks.map((t) => say(t, ticks[1] - ticks[0] || 1)) },
         { ...axis, size: 66, label: unit, labelSize: 18, labelFont: "13px system-ui" },
       ],
       ...more,
-    }, data, element);
+    }, aligned(series), element);
   }
 
   const charts = [];
@@ -194,7 +196,7 @@
     if (ends[1] - ends[0] < 1e-3) ends[1] = ends[0] + 1;
     const several = new Set(DATA.heights.map((each) => each.label.split(" ")[0])).size > 1;
     const seen = {};
-    const series = DATA.heights.map((each) => {
+    const named = DATA.heights.map((each) => {
       const said = NAMES[each.role] || each.role;
       const source = each.label.replace(/^\S+ /, "");
       const who = several ? `${each.label.split(" ")[0]} ` : "";
@@ -202,11 +204,23 @@
       return { ...each, name: `${who}${said} (${source})`, second: seen[each.role] > 1 };
     });
     const place = lanes();
-    const chart = plot(document.getElementById("heights"), series, "height, m", box.clientWidth - 28, 300, {
+    let level = named.some((each) => each.sea) ? "sea" : "said";
+    const levelled = () => named.map((each) => (level === "said" ? each : { ...each, y: each.sea || each.y.map(() => null) }));
+    const chart = plot(document.getElementById("heights"), levelled(), "height, m", box.clientWidth - 28, 300, {
       scales: { x: { time: false, range: (_, low, high) => (low === null || low === undefined ? ends : [low, high]) } },
-      hooks: { setScale: [(u, key) => key === "x" && place(u.scales.x.min, u.scales.x.max)] },
+      hooks: { setScale: [(u, key) => key === "x" && place(u.scales.x.min, u.scales.x.max)], ready: [align], setSize: [align] },
     });
-    series.forEach((each, k) => { if (each.second) chart.series[k + 1].width = 1; });
+    named.forEach((each, k) => { if (each.second) chart.series[k + 1].width = 1; });
+    const levels = all("button[data-level]");
+    for (const button of levels) {
+      button.hidden = !named.some((each) => each.sea);
+      button.addEventListener("click", () => {
+        level = button.dataset.level;
+        press(levels, button);
+        chart.setData(aligned(levelled()), false);
+        chart.setScale("x", { min: chart.scales.x.min, max: chart.scales.x.max });
+      });
+    }
     charts.push([chart, document.getElementById("heights")]);
     const show = (low, high) => {
       const length = Math.min(Math.max(high - low, (ends[1] - ends[0]) / 5000), ends[1] - ends[0]);
@@ -255,9 +269,12 @@
         clock = button.dataset.clock;
         press(clocks, button);
         for (const [each] of charts) each.redraw(false, true);
+        place(chart.scales.x.min, chart.scales.x.max);
       });
     }
   }
+
+  const ROWS = 6;
 
   // Bands of arming and modes, and the findings: each a lane above the curves.
   function lanes() {
@@ -279,13 +296,17 @@
     for (const severity of ["error", "warning", "info"]) {
       const marks = DATA.marks.filter((each) => each.severity === severity && each.from !== null);
       if (!marks.length) continue;
-      const lane = add(box, severity === "info" ? "info" : `${severity}s`, "marks");
-      for (const mark of marks) {
-        const element = make("a", `mark-at ${severity}`, signs[severity]);
+      const ends = [], rows = [];
+      for (const mark of marks.sort((a, b) => a.from - b.from)) {
+        const to = mark.to === null ? mark.from : mark.to;
+        let row = ends.findIndex((end) => end < mark.from);
+        if (row < 0) row = ends.length < ROWS ? ends.length : ROWS - 1;
+        ends[row] = Math.max(to, ends[row] === undefined ? to : ends[row]);
+        rows[row] = rows[row] || add(box, row ? "" : severity === "info" ? "info" : `${severity}s`, "marks");
+        const element = make("a", `mark-at ${severity}`, `${signs[severity]} ${mark.label.split(" ")[0]}`);
         element.href = `#${mark.anchor}`;
         element.setAttribute("aria-label", mark.label);
-        const to = mark.to === null ? mark.from : mark.to;
-        placed.push([lane.appendChild(element), { from: mark.from, to }, () => `${mark.label}, ${say(mark.from)} to ${say(to)}`]);
+        placed.push([rows[row].appendChild(element), { from: mark.from, to }, () => `${mark.label}, ${say(mark.from)} to ${say(to)}`]);
       }
     }
     return (min, max) => {
@@ -297,6 +318,14 @@
         element.title = title();
       }
     };
+  }
+  // Lanes begin and end where the plot does.
+  function align(chart) {
+    const inside = chart.over.getBoundingClientRect(), outside = document.getElementById("lanes").getBoundingClientRect();
+    for (const lane of all(".lane")) {
+      lane.firstChild.style.width = `${inside.left - outside.left}px`;
+      lane.lastChild.style.marginRight = `${Math.max(outside.right - inside.right, 0)}px`;
+    }
   }
   function add(box, name, look = "") {
     const lane = make("div", `lane ${look}`);
@@ -310,14 +339,14 @@
   function map(svg) {
     const [, , width, height] = svg.getAttribute("viewBox").split(" ").map(Number);
     const perM = Number(svg.dataset.perM);
-    const fixed = all(".fixed", svg), texts = all(".mark, .far", svg);
+    const fixed = all(".fixed", svg), texts = all(".mark, .far, .way", svg);
     const home = texts.map((each) => each.getAttribute("transform") || "");
     let view = { x: 0, y: 0, zoom: 1 };
     const apply = () => {
       const { x, y, zoom } = view;
       svg.setAttribute("viewBox", `${x} ${y} ${width / zoom} ${height / zoom}`);
       for (const each of fixed) each.setAttribute("transform", `translate(${x} ${y}) scale(${1 / zoom})`);
-      texts.forEach((each, k) => each.setAttribute("transform", `${home[k]} scale(${each.matches(".mark") ? 1 / zoom : 1})`));
+      texts.forEach((each, k) => each.setAttribute("transform", `${home[k]} scale(${each.matches(".far") ? 1 : 1 / zoom})`));
       bar(zoom);
     };
     const bar = (zoom) => {
