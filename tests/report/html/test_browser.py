@@ -197,11 +197,12 @@ def test_hostile_texts_inject_nothing(look: Look, written: Written, tmp_path: Pa
     rules = tmp_path / "rules"
     rules.mkdir()
     (rules / "FLY001-texts.toml").write_text(RULE, "utf-8")
-    records = b"".join(
-        (START_US + k * 10**6).to_bytes(8, "big")
-        + frame(*(("HEARTBEAT", {"type": 2, "autopilot": 3}) if k % 2 else said(k)), (1, 1), k)
-        for k in range(8)
-    )
+    records = b""
+    for k in range(8):
+        said = {"severity": 2, "text": HOSTILE[k * 20 : k * 20 + 48].encode()[:50]}
+        beat = frame("HEARTBEAT", {"type": 2, "autopilot": 3}, seq=2 * k)
+        for one in (beat, frame("STATUSTEXT", said, seq=2 * k + 1)):
+            records += (START_US + k * 10**6).to_bytes(8, "big") + one
     recording = tmp_path / "a\"><img src=x onerror='window.hurt=3'>.tlog"
     recording.write_bytes(records)
     page = look(written(str(recording), "--rules", str(rules))[0])
@@ -217,11 +218,6 @@ def test_hostile_texts_inject_nothing(look: Look, written: Written, tmp_path: Pa
     assert "\u202e" not in page.content()
     assert "\\u202e" in words
     assert "onerror='window.hurt=3'" in (page.locator("p.path").text_content() or "")
-
-
-def said(k: int) -> tuple[str, dict[str, object]]:
-    """Return a hostile text."""
-    return "STATUSTEXT", {"severity": 2, "text": HOSTILE[k * 20 : k * 20 + 48].encode()[:50]}
 
 
 RULE = """
