@@ -6,6 +6,7 @@ import io
 import os
 import shutil
 import sys
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from itertools import tee
@@ -90,7 +91,7 @@ def deliver(
     with ExitStack() as stack:
         files = [(each, stack.enter_context(opened(path))) for each, path in outputs]
         for drawn in (path for each, path in outputs if each in DRAWN):
-            results = drawing(results, drawn, context.for_a_file())
+            results = drawing(results, drawn, context.for_a_file(), keep=form in DRAWN)
         first, *copies = tee(results, len(files) + 1)
         closed = None
         try:
@@ -98,18 +99,26 @@ def deliver(
         except click.exceptions.Exit as left:
             closed = left
         for (each, file), copy in zip(files, copies):
-            if each not in DRAWN:
+            if each in DRAWN:
+                deque(copy, maxlen=0)
+            else:
                 _write(file, load(each)(copy, context.for_a_file()))
         if closed:
             raise closed
 
 
-def drawing(results: Iterable[Checked], path: Path, context: Context) -> Iterator[Checked]:
-    """Yield `results`, and write pages to `path` meanwhile: what is drawn of all of them is too much to keep."""
+def drawing(
+    results: Iterable[Checked], path: Path, context: Context, *, keep: bool = False
+) -> Iterator[Checked]:
+    """Yield `results`, and write pages to `path` meanwhile.
+
+    Unless told to `keep` it, what is drawn leaves the results there: of all recordings it is too much.
+    """
     from mavframecheck.report.html import write
 
     try:
-        yield from write(results, path, context)
+        for checked in write(results, path, context):
+            yield checked if keep else checked._replace(detail=None)
     except OSError as error:
         complain(sentence(f"{error.filename}: cannot write the report: {error.strerror}"))
         raise click.exceptions.Exit(2) from error

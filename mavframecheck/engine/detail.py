@@ -13,7 +13,7 @@ from mavframecheck.engine.settings import Settings
 from mavframecheck.engine.survey import Survey, summary
 from mavframecheck.engine.tracks import TrackBook, points
 from mavframecheck.model import Finding
-from mavframecheck.model.trace import Detail, Figure, Flight, Proof, Trace
+from mavframecheck.model.trace import Detail, Figure, Flight, Proof, Trace, key_of
 from mavframecheck.sources import Kind, Recording
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.flight import FlightBook
@@ -55,10 +55,10 @@ class Gatherer:
         frames = first_frames(self._path, findings, settings, dialect)
         return Detail(
             flight=flight,
-            proofs=tuple(
-                Proof(figures=(*drawn, *sent_to(finding, flight)), frame=frame)
+            proofs={
+                key_of(finding): Proof(figures=(*drawn, *sent_to(finding, flight)), frame=frame)
                 for finding, drawn, frame in zip(findings, figures, frames, strict=True)
-            ),
+            },
             survey=summary(reading, self._survey.finish(reading.vehicles())),
         )
 

@@ -5,10 +5,11 @@ Nothing here is in the JSON report: it is worked out only for a report that draw
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import msgspec
 
+from mavframecheck.model.finding import ByteLocation, Finding, MissionLocation
 from mavframecheck.model.survey import FileSurvey
 
 
@@ -69,6 +70,14 @@ class Proof(msgspec.Struct, frozen=True, kw_only=True):
     """The first hit; None where the bytes cannot be fetched again (standard input)."""
 
 
+ProofKey: TypeAlias = tuple[str, ByteLocation | MissionLocation | None, int]
+
+
+def key_of(finding: Finding) -> ProofKey:
+    """Return what tells a finding of a recording from its others, whatever severity it is given."""
+    return finding.fingerprint, finding.location, finding.count
+
+
 class Band(msgspec.Struct, frozen=True, kw_only=True):
     """A time in which a vehicle was armed, or in one mode."""
 
@@ -114,7 +123,7 @@ class Detail(msgspec.Struct, frozen=True, kw_only=True):
     """What a report that draws needs of one file, beside the report and its findings."""
 
     flight: Flight
-    proofs: tuple[Proof, ...]
-    """One for each finding, in their order."""
+    proofs: dict[ProofKey, Proof]
+    """By what `key_of` says of each finding."""
     survey: FileSurvey
     """The semantic map."""

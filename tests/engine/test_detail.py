@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mavframecheck.engine import Settings
 from mavframecheck.engine.check import check_file, draw_file, draw_recording
 from mavframecheck.model import ByteLocation
-from mavframecheck.model.trace import Detail, Trace
+from mavframecheck.model.trace import Detail, Trace, key_of
 from mavframecheck.sources import Kind
 from samples.make import HERE
 from tests.engine.judged import CutRecording, pack_of, rule, shipped
@@ -54,7 +54,7 @@ def test_drawing_changes_no_finding(sample: Path) -> None:
     plain = check_file(str(sample), shipped(), Settings())
     report, findings, detail = draw_file(str(sample), shipped(), Settings())
     assert (report, findings) == plain
-    assert len(detail.proofs) == len(findings)
+    assert set(detail.proofs) == {key_of(finding) for finding in findings}
 
 
 def trace(traces: tuple[Trace, ...], label: str) -> Trace:
@@ -75,7 +75,7 @@ def test_a_flight_as_its_sample_was_made() -> None:
     assert trace(flight.tracks, "1/1 GLOBAL_POSITION_INT").role == "vehicle"
     assert min(trace(flight.tracks, "1/191 SET_POSITION_TARGET_GLOBAL_INT").y) == 47e-7
     assert {point.kind for point in flight.points} == {"home", "origin", "launch"}
-    (proof,) = detail.proofs
+    (proof,) = detail.proofs.values()
     assert [figure.kind for figure in proof.figures] == ["plan"]
     assert proof.frame is not None
     location = finding.location
@@ -100,8 +100,8 @@ def test_a_rule_draws_what_it_judged() -> None:
     recording = CutRecording(b"".join(records), [b"".join(records)], Kind.TLOG)
     _, findings, detail = draw_recording(recording, pack_of(drawing), Settings(), DIALECT)
     assert [finding.sysid for finding in findings] == [1, 2]
-    for finding, proof in zip(findings, detail.proofs, strict=True):
-        said, most = proof.figures[0].traces
+    for finding in findings:
+        said, most = detail.proofs[key_of(finding)].figures[0].traces
         assert max(said.y) == pytest.approx(3.9 + 10 * (finding.sysid or 0), abs=1e-5)
         assert set(most.y) == {1.0}
         assert len(said.t) == 40

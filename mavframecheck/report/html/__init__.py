@@ -26,7 +26,7 @@ def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
 
 
 def write(results: Iterable[Checked], path: Path, context: Context) -> Iterator[Checked]:
-    """Write the report to `path` while `results` pass by; they lose what was only kept to be drawn.
+    """Write the report to `path` while `results` pass by.
 
     One recording is a page at `path`. For several, `path` is an index, and the pages lie in a folder
     beside it that has its name. OSError when something cannot be written.
@@ -42,7 +42,7 @@ def write(results: Iterable[Checked], path: Path, context: Context) -> Iterator[
             if len(entries) == 2:
                 entries[0] = _place(first, entries[0], 1, path)
             entries[-1] = _place(text, entries[-1], len(entries), path)
-        yield checked._replace(detail=None)
+        yield checked
     _save(path, first if len(entries) == 1 else index(entries, context))
 
 

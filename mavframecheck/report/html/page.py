@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from mavframecheck.model import ByteLocation, FileReport, Finding, Rule, Severity
-from mavframecheck.model.trace import Detail, Figure, Flight, FrameBytes, Proof, Trace
+from mavframecheck.model.trace import Detail, Figure, Flight, FrameBytes, Proof, Trace, key_of
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.html import curves, heights, meaning
@@ -130,12 +130,12 @@ def _facts(file: FileReport) -> list[tuple[str, str, str]]:
 def _cards(checked: Checked, context: Context) -> list[Card]:
     """Return the findings, the worst first; the surest of these, then in order of time."""
     rules = {rule.code: rule for rule in context.rules}
-    nothing = [Proof()] * len(checked.findings)
-    proofs = nothing if checked.detail is None else checked.detail.proofs
+    proofs = {} if checked.detail is None else checked.detail.proofs
     order = sorted(range(len(checked.findings)), key=lambda k: _rank(checked.findings[k]))
     cards = []
     for place, k in enumerate(order):
-        finding, proof = checked.findings[k], proofs[k]
+        finding = checked.findings[k]
+        proof = proofs.get(key_of(finding), Proof())
         drawn = proof.figures if place < MOST_FIGURES else ()
         cards.append(
             Card(
