@@ -23,7 +23,8 @@ def test_one_pass_gives_every_report(engine: FakeEngine, logs: Path, run: Run) -
     assert engine.checked == ["a.tlog", "b.tlog"]
     assert result.stdout_bytes == Path("report.text").read_bytes()
     assert len(json.loads(Path("report.json").read_bytes())["files"]) == 2
-    assert "report/001-a.html" in Path("report.html").read_text("utf-8")
+    for page in sorted(Path("report").iterdir()):
+        assert f'href="report/{page.name}"' in Path("report.html").read_text("utf-8")
     for form in FORMATS.keys() - DRAWN:
         alone = run("check", "a.tlog", "b.tlog", "--format", form).stdout_bytes
         assert Path(f"report.{form}").read_bytes() == alone
@@ -70,5 +71,5 @@ def test_report_writes_pages(engine: FakeEngine, logs: Path, run: Run) -> None:
     assert "finding-1" in Path("report.html").read_text("utf-8")
     result = run("report", "a.tlog", "b.tlog", "--output", "all.html")
     assert (result.exit_code, result.stderr) == (0, "mavframecheck: wrote all.html\n")
-    assert {file.name for file in Path("all").iterdir()} == {"001-a.html", "002-b.html"}
+    assert [file.name[:4] for file in sorted(Path("all").iterdir())] == ["001-", "002-"]
     assert run("report", "a.tlog", "--output", "missing/r.html").exit_code == 2
