@@ -33,10 +33,9 @@ def of_axes(
         return
     went, was = went - went[0], was - was[0]
     labelled, corrected = went @ frame.axes, went @ fit.matrix / (fit.scale or 1.0)
-    says = f": {fit.says}" if fit.says else ""
     lines = (
         ("as labelled", "claimed", labelled, "As labelled"),
-        ("with the axes that fit", "corrected", corrected, f"With the axes that fit{says}"),
+        ("with the axes that fit", "corrected", corrected, "With the axes that fit"),
     )
     for label, role, path, title in lines:
         traces = (_path(truth.message, "reference", t, was), _path(label, role, t, path))

@@ -181,7 +181,7 @@ def _map(figure: Figure) -> Markup | None:
         for t in figure.traces
     ]
     sent = [p._replace(dots=p.role == "claimed" and len(p.east) < 200) for p in paths]
-    return plan(sent if "sent" in figure.title else paths, (), 460, 340, figure.title)
+    return plan(sent if "sent" in figure.title else paths, (), 400, 300, figure.title)
 
 
 _MUST = ("vehicle", "gnss", "truth")

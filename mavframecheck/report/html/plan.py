@@ -26,7 +26,7 @@ _ARROW_AT, _SHORTEST = 0.3, 60.0
 """Where on a line its direction is shown (share of its length), and from what length on."""
 _MARGIN = 0.08
 _MOST_MARKS = 40
-_APART = 14.0
+_APART = 26.0
 """Marks nearer to each other on the drawing are one."""
 
 

@@ -2,40 +2,31 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from playwright.sync_api import Browser, Page, Request, sync_playwright
+from playwright.sync_api import Browser, Page, Request
 
 from mavframecheck.cli import main
-
-FLAGS = (
-    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-)
-CHROMIUM = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
+from tools.browser import MISSING, browser, chromium
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    """Return a Chromium of the system, with a new and empty profile."""
-    if CHROMIUM is None:
-        pytest.skip("no Chromium here: apt-get install chromium")
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
-        yield opened
-        opened.close()
+def opened() -> Iterator[Browser]:
+    """Return the browser of the system."""
+    path = chromium()
+    if path is None:
+        pytest.skip(MISSING)
+    with browser(path) as found:
+        yield found
 
 
 @pytest.fixture
-def look(browser: Browser) -> Iterator[Callable[[Path], Page]]:
+def look(opened: Browser) -> Iterator[Callable[[Path], Page]]:
     """Return what opens a page; whatever the console or the network sees makes the test fail."""
-    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    context = opened.new_context(viewport={"width": 1280, "height": 900})
     trouble: list[str] = []
 
     def asked(request: Request) -> None:

@@ -136,7 +136,7 @@
   }
   function aligned(series) {
     const tables = series.map((each) => [each.t, each.y]);
-    return tables.length ? uPlot.join(tables) : [[]];
+    return tables.length ? uPlot.join(tables, tables.map(() => [1, 2])) : [[]];
   }
   function plot(element, series, unit, width, height, more = {}) {
     const axis = { stroke: () => colour("faint"), grid: { stroke: () => colour("rule"), width: 1 }, ticks: { show: false } };
@@ -204,10 +204,11 @@
       return { ...each, name: `${who}${said} (${source})`, second: seen[each.role] > 1 };
     });
     const place = lanes();
+    let view = ends;
     let level = named.some((each) => each.sea) ? "sea" : "said";
     const levelled = () => named.map((each) => (level === "said" ? each : { ...each, y: each.sea || each.y.map(() => null) }));
     const chart = plot(document.getElementById("heights"), levelled(), "height, m", box.clientWidth - 28, 300, {
-      scales: { x: { time: false, range: (_, low, high) => (low === null || low === undefined ? ends : [low, high]) } },
+      scales: { y: { range: (chart, low, high) => bulk(chart, view, low, high) }, x: { time: false, range: (_, low, high) => (view = low === null || low === undefined ? ends : [low, high]) } },
       hooks: { setScale: [(u, key) => key === "x" && place(u.scales.x.min, u.scales.x.max)], ready: [align], setSize: [align] },
     });
     named.forEach((each, k) => { if (each.second) chart.series[k + 1].width = 1; });
@@ -318,6 +319,24 @@
         element.title = title();
       }
     };
+  }
+  // The axis of heights shows the bulk of what is in view: a moment at zero must not flatten a flight.
+  function bulk(chart, [from, to], low, high) {
+    const seen = [];
+    chart.data.slice(1).forEach((values, k) => {
+      if (chart.series[k + 1].show) values.forEach((y, n) => {
+        if (y !== null && y !== undefined && chart.data[0][n] >= from && chart.data[0][n] <= to) seen.push(y);
+      });
+    });
+    if (!seen.length || low === null) return [0, 1];
+    seen.sort((a, b) => a - b);
+    const a = seen[Math.floor(seen.length * 0.02)], b = seen[Math.ceil(seen.length * 0.98) - 1];
+    const margin = Math.max((b - a) * 0.5, 2);
+    const range = [Math.max(low, a - margin), Math.min(high, b + margin)];
+    const left = seen.filter((y) => y < range[0] || y > range[1]).length;
+    document.getElementById("outside").textContent = left ? `${left} of ${seen.length} drawn values lie outside the axis` : "";
+    const edge = Math.max((range[1] - range[0]) * 0.06, 0.5);
+    return [range[0] - edge, range[1] + edge];
   }
   // Lanes begin and end where the plot does.
   function align(chart) {
