@@ -25,6 +25,8 @@ class Trace(msgspec.Struct, frozen=True, kw_only=True):
     """Receive time, s since 1970; the running number of the frame where the recording has no times."""
     y: tuple[float, ...]
     """Values in the unit of the figure, NaN where there is none; north (or latitude, deg) on a map."""
+    system: int | None = None
+    """The vehicle that says it, in a `Flight`."""
     x: tuple[float, ...] | None = None
     """East (or longitude, deg) on a map; None: a line over time."""
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -161,7 +162,9 @@ class FlightBook:
             tag = catalogue.tags_of(str(message), str(name))[0]
             role = "ground" if (message, name) == GROUND else str(tag.alt_ref)
             label = f"{int(sender) >> 8}/{int(sender) & 0xFF} {message}.{name}"
-            yield line(label, t, values[:, 0], role)
+            yield msgspec.structs.replace(
+                line(label, t, values[:, 0], role), system=int(sender) >> 8
+            )
 
     def boots(self) -> Iterator[Trace]:
         """Yield the clock of each vehicle, by the message that tells it most often."""

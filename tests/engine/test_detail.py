@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -42,7 +44,7 @@ def test_samples_are_drawn_the_same(sample: Path, cuts: list[int]) -> None:
     assert repr(drawn(sample.read_bytes(), tuple(cuts))) == whole(sample)
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=traffic(), cuts=st.lists(st.integers(0, 3000), min_size=1, max_size=12))
 def test_any_traffic_is_drawn_the_same(data: bytes, cuts: list[int]) -> None:
     """Roles that change, clocks that leap, context that comes late."""
@@ -105,3 +107,17 @@ def test_a_rule_draws_what_it_judged() -> None:
         assert max(said.y) == pytest.approx(3.9 + 10 * (finding.sysid or 0), abs=1e-5)
         assert set(most.y) == {1.0}
         assert len(said.t) == 40
+
+
+def test_a_plain_check_knows_nothing_of_drawing() -> None:
+    """Start-up and memory of `check` are those of judging alone."""
+    code = (
+        "import sys; from mavframecheck.cli import main\n"
+        f"try: main(['check', {str(SAMPLES[0])!r}])\n"
+        "except SystemExit: pass\n"
+        "drawing = ('model.trace', 'engine.detail', 'vehicle.flight', 'vehicle.thinning', 'report.html')\n"
+        "found = {f'mavframecheck.{each}' for each in drawing} & set(sys.modules)\n"
+        "sys.exit(' '.join(found | {'jinja2'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, "\n")

@@ -11,8 +11,8 @@ from pathlib import Path
 from urllib.parse import quote
 
 from mavframecheck.report import Checked, Context
-from mavframecheck.report.html.index import Entry, index
-from mavframecheck.report.html.page import page
+from mavframecheck.report.html.index import Entry, index_of
+from mavframecheck.report.html.page import page_of
 
 
 def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
@@ -21,8 +21,8 @@ def render(results: Iterable[Checked], context: Context) -> Iterator[str]:
     only = ""
     for checked in results:
         entries.append(Entry.of(checked))
-        only = page(checked, context) if len(entries) == 1 else ""
-    yield only or index(entries, context)
+        only = page_of(checked, context) if len(entries) == 1 else ""
+    yield only or index_of(entries, context)
 
 
 def write(results: Iterable[Checked], path: Path, context: Context) -> Iterator[Checked]:
@@ -35,7 +35,7 @@ def write(results: Iterable[Checked], path: Path, context: Context) -> Iterator[
     first = ""
     for checked in results:
         entries.append(Entry.of(checked))
-        text = page(checked, context)
+        text = page_of(checked, context)
         if len(entries) == 1:
             first = text
         else:
@@ -43,7 +43,7 @@ def write(results: Iterable[Checked], path: Path, context: Context) -> Iterator[
                 entries[0] = _place(first, entries[0], 1, path)
             entries[-1] = _place(text, entries[-1], len(entries), path)
         yield checked
-    _save(path, first if len(entries) == 1 else index(entries, context))
+    _save(path, first if len(entries) == 1 else index_of(entries, context))
 
 
 def _place(text: str, entry: Entry, number: int, path: Path) -> Entry:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy.typing as npt
 
 from mavframecheck.model.trace import Figure, Trace
 from mavframecheck.report.escape import sentence
+from mavframecheck.vehicle.thinning import extremes
 
 Floats = npt.NDArray[np.float64]
 
@@ -42,16 +42,9 @@ def thin(t: Floats, y: Floats, most: int) -> tuple[Floats, Floats]:
     """Return least and greatest of every few rows, so that about `most` are left."""
     if len(t) <= most:
         return t, y
-    edges = np.linspace(0, len(t), max(most // 2, 1) + 1).astype(np.int64)
-    kept = [place for one in _pairs(y, edges) for place in one]
-    places = np.unique(kept)
+    stretch = np.arange(len(t)) * max(most // 2, 1) // len(t)
+    places = extremes(stretch, y[:, np.newaxis])
     return t[places], y[places]
-
-
-def _pairs(y: Floats, edges: npt.NDArray[np.int64]) -> Iterator[tuple[int, int]]:
-    for low, high in zip(edges[:-1].tolist(), edges[1:].tolist()):
-        part = np.nan_to_num(y[low:high])
-        yield low + int(part.argmin()), low + int(part.argmax())
 
 
 def torn(t: Floats, y: Floats) -> tuple[Floats, Floats]:

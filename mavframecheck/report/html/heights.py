@@ -32,11 +32,10 @@ def curves_of(flight: Flight, start: float, most: int) -> list[dict[str, Any]]:
 
 def _level(trace: Trace, flight: Flight, t: Floats) -> Floats | None:
     """Return (n,) how high above mean sea level the zero of a height is; None where it is not known."""
-    system = int(trace.label.partition("/")[0])
     if trace.role in ("msl", "ground"):
         return np.zeros(len(t))
     if trace.role in ("home", "origin"):
-        places = [p for p in flight.points if (p.kind, p.system) == (trace.role, system)]
+        places = [p for p in flight.points if (p.kind, p.system) == (trace.role, trace.system)]
         known = [(p.time if p.time is not None else -np.inf, p.alt_msl) for p in places]
         return _last(known, t) if known else None
     if trace.role == "ellipsoid":

@@ -64,7 +64,7 @@ def _common(paths: Sequence[str]) -> str:
     return folders.pop() if len(folders) == 1 else ""
 
 
-def index(entries: Sequence[Entry], context: Context) -> str:
+def index_of(entries: Sequence[Entry], context: Context) -> str:
     """Return the page that lists recordings."""
     counts = Counter(
         {

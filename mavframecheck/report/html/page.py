@@ -47,7 +47,7 @@ class Card(NamedTuple):
     dump: list[tuple[str, str, str]]
 
 
-def page(checked: Checked, context: Context) -> str:
+def page_of(checked: Checked, context: Context) -> str:
     """Return the page of a recording, no larger than `MAX_BYTES`."""
     text = ""
     for most in POINTS:
