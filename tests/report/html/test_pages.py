@@ -105,13 +105,13 @@ def detail(
 
 
 def test_a_page_is_bounded() -> None:
-    """A hundred findings with long proofs, and sixty heights."""
-    findings = tuple(made_up.finding(count=k + 1) for k in range(100))
+    """Forty findings with long proofs, and thirty heights."""
+    findings = tuple(made_up.finding(count=k + 1) for k in range(40))
     checked = Checked(made_up.file(), findings)
-    drawn = detail(checked, heights=tuple(long_trace(k) for k in range(60)))
+    drawn = detail(checked, heights=tuple(long_trace(k) for k in range(30)))
     text = pages.page_of(checked._replace(detail=drawn), CONTEXT)
     assert len(text.encode()) <= pages.MAX_BYTES
-    assert text.count('<details class="card') == 100
+    assert text.count('<details class="card') == 40
 
 
 def test_what_comes_from_a_log_is_escaped_and_visible() -> None:
