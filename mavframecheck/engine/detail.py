@@ -16,8 +16,7 @@ from mavframecheck.model import Finding
 from mavframecheck.model.trace import Detail, Figure, Flight, Proof, Trace, key_of
 from mavframecheck.sources import Kind, Recording
 from mavframecheck.vehicle import Context
-from mavframecheck.vehicle.flight import FlightBook
-from mavframecheck.vehicle.pairs import metres
+from mavframecheck.vehicle.flight import FlightBook, on_plane
 from mavframecheck.wire import Batch, Dialect
 
 AROUND_S = 10.0
@@ -110,7 +109,7 @@ def _between(trace: Trace, since: float, until: float) -> Trace:
 
 def _local(trace: Trace, centre: Trace, label: str, role: str) -> Trace:
     """Return latitude and longitude as metres from where `centre` begins."""
-    lat0, lon0 = np.asarray(centre.y[0]), np.asarray(centre.x[0] if centre.x else 0.0)
-    north, east = metres(np.array(trace.y), np.array(trace.x), lat0, lon0)
+    lon0 = centre.x[0] if centre.x else 0.0
+    north, east = on_plane(np.array(trace.y), np.array(trace.x), centre.y[0], lon0)
     y, x = tuple(north.tolist()), tuple(east.tolist())
     return Trace(label=label, role=role, t=trace.t, y=y, x=x)

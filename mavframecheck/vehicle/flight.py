@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.geo.geodesy import bearing_deg, distance_m
 from mavframecheck.model.trace import Band, Trace
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.tags import FieldTag
@@ -189,6 +190,13 @@ def line(
     t, rows = thinned(t, np.column_stack(columns), most)
     east = None if x is None else tuple(rows[:, 1].tolist())
     return Trace(label=label, role=role, t=tuple(t.tolist()), y=tuple(rows[:, 0].tolist()), x=east)
+
+
+def on_plane(lat: Floats, lon: Floats, lat0: float, lon0: float) -> tuple[Floats, Floats]:
+    """Return (n,) metres north and east of a place, deg: distance and bearing along the ellipsoid are true."""
+    away = distance_m(lat0, lon0, lat, lon)
+    bearing = np.radians(np.nan_to_num(bearing_deg(lat0, lon0, lat, lon)))
+    return away * np.cos(bearing), away * np.sin(bearing)
 
 
 def _autopilots(table: Table, context: Context) -> Iterator[tuple[int, Table]]:

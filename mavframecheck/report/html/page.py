@@ -20,7 +20,7 @@ from mavframecheck.report.html.plan import Mark, Path, plan
 from mavframecheck.report.told import evidence_rows, when
 from mavframecheck.report.verdict import found, judged, verdicts
 from mavframecheck.report.words import component, duration, plural, utc
-from mavframecheck.vehicle.pairs import metres
+from mavframecheck.vehicle.flight import on_plane
 
 MAX_BYTES = 1_900_000
 """A page is no larger: curves are drawn from fewer points until it fits."""
@@ -230,7 +230,7 @@ def _centre(flight: Flight, tracks: Sequence[Trace]) -> tuple[float, float]:
 def _metres(
     lat: Sequence[float], lon: Sequence[float], lat0: float, lon0: float
 ) -> tuple[Any, Any]:
-    north, east = metres(np.array(lat), np.array(lon), np.asarray(lat0), np.asarray(lon0))
+    north, east = on_plane(np.array(lat), np.array(lon), lat0, lon0)
     return east, north
 
 
