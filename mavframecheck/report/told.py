@@ -39,13 +39,14 @@ def where(finding: Finding) -> str:
     match finding.location:
         case ByteLocation(offset=offset):
             return f"first at byte {offset}" if finding.count > 1 else f"byte {offset}"
-        case MissionLocation(line=line, item=item, command=command):
+        case MissionLocation(line=line, column=column, item=item, command=command):
             parts = (
                 f"line {line}" if line is not None else "",
+                f"column {column}" if column is not None else "",
                 f"item {item}" if item is not None else "",
                 command or "",
             )
-            return ", ".join(filter(None, parts))
+            return ("first in " if finding.count > 1 else "") + ", ".join(filter(None, parts))
     return ""
 
 

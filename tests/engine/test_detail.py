@@ -56,6 +56,7 @@ def test_drawing_changes_no_finding(sample: Path) -> None:
     plain = check_file(str(sample), shipped(), Settings())
     report, findings, detail = draw_file(str(sample), shipped(), Settings())
     assert (report, findings) == plain
+    assert detail is not None
     assert set(detail.proofs) == {key_of(finding) for finding in findings}
 
 
@@ -68,6 +69,7 @@ def test_a_flight_as_its_sample_was_made() -> None:
     """Bands, heights under each reference, track, targets and home of a sample whose making is known."""
     sample = str(HERE / "degrees_in_scaled_field.tlog")
     _, (finding,), detail = draw_file(sample, shipped(), Settings())
+    assert detail is not None
     flight = detail.flight
     assert {band.label for band in flight.bands} == {"armed", "disarmed", "GUIDED", "LAND"}
     by_role = {each.role: max(each.y) for each in flight.heights}
