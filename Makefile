@@ -8,7 +8,7 @@ CORPUS ?= ../shared/corpus
 BASELINE ?= build/corpus-baseline.jsonl
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test fuzz check generate docs samples bench bench-link accuracy injection corpus-frames corpus-diff clean
+.PHONY: help demo test fuzz check generate docs samples screenshots bench bench-link accuracy injection corpus-frames corpus-diff clean
 
 help:  ## list these targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -51,6 +51,9 @@ docs: $(DOCS_READY)  ## the documentation site into build/site; a broken link fa
 
 samples: $(READY)  ## write samples/ again
 	$(BIN)/python -m samples.make
+
+screenshots: $(READY)  ## the pictures of the HTML report in docs/images (needs chromium)
+	$(BIN)/python -m tools.screenshots
 
 bench: $(READY)  ## speed and memory against the required figures (about five minutes)
 	$(BIN)/python -m benchmarks.bench --corpus $(CORPUS)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.vehicle import Context
 from mavframecheck.wire import Batch, Dialect, Frames
+
+if TYPE_CHECKING:
+    from mavframecheck.model.trace import Figure
 
 
 class Place(NamedTuple):
@@ -70,6 +73,10 @@ class Check(ABC):
     @abstractmethod
     def finish(self) -> Iterable[Observation]:
         """Return what was found in the whole recording."""
+
+    def figures(self, observation: Observation) -> tuple[Figure, ...]:  # noqa: ARG002
+        """Return what proves an observation; asked for after `finish`, and only by reports that draw."""
+        return ()
 
     @abstractmethod
     def verdict(self) -> Verdict:

@@ -6,7 +6,7 @@ All share one model, `Context.clocks`; what it shows is drawn once, when the rec
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,9 @@ from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.clocks import MAX_EVENTS, Seen, StepBack, Still
 from mavframecheck.vehicle.timing import STEP_S, Clocks, Pool, Step, Timing, wraps
 from mavframecheck.wire import Batch, Dialect
+
+if TYPE_CHECKING:
+    from mavframecheck.model.trace import Figure
 
 Floats = npt.NDArray[np.float64]
 
@@ -65,6 +68,12 @@ class ClockCheck(Check):
         if self.timed and self.clocks.timings and not self.clocks.received:
             return Verdict(0, "the recording has no receive times that can be believed")
         return Verdict(rows, self.undecided if self.clocks.timings and not rows else "")
+
+    def figures(self, observation: Observation) -> tuple[Figure, ...]:
+        """Return how the clock of the stream, or else of its component, ran against receive time."""
+        from mavframecheck.checks.clock_figures import offsets
+
+        return tuple(offsets(self.clocks, observation.subject))
 
     def autopilot(self, sender: int) -> bool:
         """Return whether a sender is an autopilot."""

@@ -28,9 +28,16 @@ class Audit(Files[Checked]):
     usage_errors = (*Files.usage_errors, engine.SettingsError, engine.RuleFileError)
 
     def __init__(
-        self, paths: Sequence[str], chosen: Chosen, jobs: int = 1, *, fix: bool = False
+        self,
+        paths: Sequence[str],
+        chosen: Chosen,
+        jobs: int = 1,
+        *,
+        fix: bool = False,
+        draw: bool = False,
     ) -> None:
-        super().__init__(paths, partial(_judge, chosen.pack, chosen.settings, fix), missions=True)
+        judge = partial(_judge, chosen.pack, chosen.settings, fix, draw)
+        super().__init__(paths, judge, missions=True)
         self._chosen = chosen
         self._jobs = jobs
         self._worst = -1
@@ -89,12 +96,20 @@ class Audit(Files[Checked]):
 
 
 def _judge(
-    pack: engine.Pack, settings: engine.Settings, fix: bool, path: str, advance: Advance | None
+    pack: engine.Pack,
+    settings: engine.Settings,
+    fix: bool,
+    draw: bool,
+    path: str,
+    advance: Advance | None,
 ) -> tuple[Checked, int]:
-    """Judge one file, in whatever process; `fix` first mends what is certain in it."""
+    """Judge one file, in whatever process; `fix` first mends what is certain, `draw` keeps what is drawn."""
     if fix:
         from mavframecheck.cli.mend import mend_in_place
 
         mend_in_place(path, pack, settings)
+    if draw:
+        file, findings, detail = engine.draw_file(path, pack, settings, advance)
+        return Checked(file, findings, detail=detail), file.messages
     checked = Checked(*engine.check_file(path, pack, settings, advance))
     return checked, checked.file.messages

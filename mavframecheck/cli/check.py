@@ -11,7 +11,7 @@ import msgspec
 
 from mavframecheck.cli.output import deliver, echo, lines, page_context, parse_outputs
 from mavframecheck.cli.settings import choose, settings_options, shown
-from mavframecheck.report import FORMATS
+from mavframecheck.report import DRAWN, FORMATS
 
 if TYPE_CHECKING:
     from mavframecheck.cli.audit import Audit
@@ -116,11 +116,12 @@ def check(
     chosen = chosen._replace(settings=msgspec.structs.replace(chosen.settings, plan=plan))
     if diff:
         _show_diff(ctx, paths, chosen)
-    audit = _audit(paths, watch, chosen, jobs or os.cpu_count() or 1, fix=fix)
+    form = "statistics" if statistics else form or _default_format()
+    draw = bool(DRAWN & {form, *(each for each, _ in outputs)})
+    audit = _audit(paths, watch, chosen, jobs or os.cpu_count() or 1, fix=fix, draw=draw)
     context = page_context(verbose=verbose)._replace(
         rules=tuple(chosen.pack.rules), fail_on=chosen.fail_on, remarks=audit.remarks
     )
-    form = "statistics" if statistics else form or _default_format()
     deliver(audit.results(), form, outputs, context)
     ctx.exit(audit.exit_code())
 
@@ -134,15 +135,21 @@ def _show_diff(ctx: click.Context, paths: tuple[str, ...], chosen: Chosen) -> No
 
 
 def _audit(
-    paths: tuple[str, ...], watch: Path | None, chosen: Chosen, jobs: int, *, fix: bool
+    paths: tuple[str, ...],
+    watch: Path | None,
+    chosen: Chosen,
+    jobs: int,
+    *,
+    fix: bool,
+    draw: bool,
 ) -> Audit:
     if watch:
         from mavframecheck.cli.vigil import Vigil
 
-        return Vigil(watch, chosen)
+        return Vigil(watch, chosen, draw=draw)
     from mavframecheck.cli.audit import Audit
 
-    return Audit(paths, chosen, jobs, fix=fix)
+    return Audit(paths, chosen, jobs, fix=fix, draw=draw)
 
 
 def _default_format() -> str:

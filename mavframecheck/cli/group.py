@@ -16,6 +16,7 @@ COMMANDS = {
     "check": "Judge recordings and missions; exit 1 on findings.",
     "watch": "Judge links to vehicles while they are up.",
     "inspect": "Show what the numbers of a recording mean: the map of its streams.",
+    "report": "Write a page for each recording: what was found, and how we know.",
     "rules": "List the rules.",
     "rule": "Explain one rule.",
     "completion": "Write the script that makes a shell complete this command.",

@@ -6,6 +6,7 @@ import io
 import os
 import shutil
 import sys
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from itertools import tee
@@ -15,7 +16,7 @@ from typing import BinaryIO, NoReturn
 import click
 
 from mavframecheck import __version__
-from mavframecheck.report import FILE_WIDTH, FORMATS, Checked, Context, Piece, load
+from mavframecheck.report import DRAWN, FILE_WIDTH, FORMATS, Checked, Context, Piece, load
 from mavframecheck.report.escape import sentence
 
 CLOSED_PIPE = 141
@@ -88,7 +89,9 @@ def deliver(
     closed on the way.
     """
     with ExitStack() as stack:
-        files = [(each, stack.enter_context(_opened(path))) for each, path in outputs]
+        files = [(each, stack.enter_context(opened(path))) for each, path in outputs]
+        for drawn in (path for each, path in outputs if each in DRAWN):
+            results = drawing(results, drawn, context.for_a_file(), keep=form in DRAWN)
         first, *copies = tee(results, len(files) + 1)
         closed = None
         try:
@@ -96,12 +99,33 @@ def deliver(
         except click.exceptions.Exit as left:
             closed = left
         for (each, file), copy in zip(files, copies):
-            _write(file, load(each)(copy, context.for_a_file()))
+            if each in DRAWN:
+                deque(copy, maxlen=0)
+            else:
+                _write(file, load(each)(copy, context.for_a_file()))
         if closed:
             raise closed
 
 
-def _opened(path: Path) -> BinaryIO:
+def drawing(
+    results: Iterable[Checked], path: Path, context: Context, *, keep: bool = False
+) -> Iterator[Checked]:
+    """Yield `results`, and write pages to `path` meanwhile.
+
+    Unless told to `keep` it, what is drawn leaves the results there: of all recordings it is too much.
+    """
+    from mavframecheck.report.html import write
+
+    try:
+        for checked in write(results, path, context):
+            yield checked if keep else checked._replace(detail=None)
+    except OSError as error:
+        complain(sentence(f"{error.filename}: cannot write the report: {error.strerror}"))
+        raise click.exceptions.Exit(2) from error
+
+
+def opened(path: Path) -> BinaryIO:
+    """Return a file to write a report to; one that cannot be written is a usage error."""
     try:
         return path.open("wb")
     except OSError as error:

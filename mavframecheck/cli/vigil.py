@@ -21,8 +21,8 @@ POLL_S = 1.0
 class Vigil(Audit):
     """The recordings that appear in one directory."""
 
-    def __init__(self, directory: Path, chosen: Chosen) -> None:
-        super().__init__([str(directory)], chosen)
+    def __init__(self, directory: Path, chosen: Chosen, *, draw: bool = False) -> None:
+        super().__init__([str(directory)], chosen, draw=draw)
         self._directory = directory
 
     def _files(self) -> list[str]:

@@ -1,6 +1,6 @@
 """Rules over rows: loading, expressions, running, episodes, verdicts."""
 
-from mavframecheck.engine.check import check_file, check_recording
+from mavframecheck.engine.check import check_file, check_recording, draw_file
 from mavframecheck.engine.choices import parameter, selectors, similar
 from mavframecheck.engine.compiled import Pack
 from mavframecheck.engine.expression import RuleFileError
@@ -15,6 +15,7 @@ __all__ = [
     "check_file",
     "check_recording",
     "chosen_rules",
+    "draw_file",
     "load_pack",
     "parameter",
     "selectors",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from mavframecheck.checks import load_check
 from mavframecheck.checks.missions.plans import Plans
 from mavframecheck.engine.compiled import CompiledRule, Pack
 from mavframecheck.engine.pack import chosen_rules
 from mavframecheck.engine.reading import Progress, Reading
-from mavframecheck.engine.runner import Runner
+from mavframecheck.engine.runner import Onlooker, Runner
 from mavframecheck.engine.settings import Settings
 from mavframecheck.missions import read_mission
 from mavframecheck.missions.upload import ITEM, Upload
@@ -23,6 +25,9 @@ from mavframecheck.sources import (
 )
 from mavframecheck.vehicle import Context
 from mavframecheck.wire import Dialect, load_dialect
+
+if TYPE_CHECKING:
+    from mavframecheck.model.trace import Detail
 
 
 def check_file(
@@ -48,14 +53,61 @@ def check_recording(
     progress: Progress | None = None,
 ) -> tuple[FileReport, tuple[Finding, ...]]:
     """Judge an open recording."""
+    return summed_up(*_judged(recording, pack, settings, dialect, progress))
+
+
+def draw_file(
+    path: str, pack: Pack, settings: Settings, progress: Progress | None = None
+) -> tuple[FileReport, tuple[Finding, ...], Detail | None]:
+    """Judge like `check_file`, and keep what a report that draws shows besides; of a mission file, nothing."""
+    dialect = load_dialect(settings.dialect)
+    with open_recording(path, settings.input_kind, RECORDINGS | MISSIONS) as recording:
+        if recording.kind in MISSIONS:
+            return *check_mission(recording, pack, settings, dialect), None
+        return draw_recording(recording, pack, settings, dialect, progress)
+
+
+def draw_recording(
+    recording: Recording,
+    pack: Pack,
+    settings: Settings,
+    dialect: Dialect,
+    progress: Progress | None = None,
+) -> tuple[FileReport, tuple[Finding, ...], Detail]:
+    """Judge an open recording, and keep what a report that draws shows besides."""
+    from mavframecheck.engine.detail import Gatherer
+
+    gatherer = Gatherer(recording)
+    reading, runner = _judged(recording, pack, settings, dialect, progress, gatherer)
+    report, findings = summed_up(reading, runner)
+    detail = gatherer.detail(reading, findings, runner.figures(), settings, dialect)
+    return report, findings, detail
+
+
+def _judged(
+    recording: Recording,
+    pack: Pack,
+    settings: Settings,
+    dialect: Dialect,
+    progress: Progress | None,
+    onlooker: Onlooker | None = None,
+) -> tuple[Reading, Runner]:
+    """Read and judge a recording to its end."""
     reading = Reading(recording, settings, dialect)
     if settings.plan is not None:
         Plans.of(reading.context).intend(_upload_of(settings.plan, settings, dialect).batch)
     rules = chosen_rules(pack, settings)
-    runner = Runner(recording.name, rules, reading.context, dialect, only=settings.sender)
+    runner = Runner(
+        recording.name,
+        rules,
+        reading.context,
+        dialect,
+        only=settings.sender,
+        onlooker=onlooker,
+    )
     for batch in reading.batches(progress):
         runner.update(batch)
-    return summed_up(reading, runner)
+    return reading, runner
 
 
 def summed_up(reading: Reading, runner: Runner) -> tuple[FileReport, tuple[Finding, ...]]:

@@ -11,7 +11,7 @@ import msgspec
 
 from mavframecheck.engine.expression import ANY_NAME, Expression, ExpressionError, RuleFileError
 from mavframecheck.engine.template import Template
-from mavframecheck.model import Rule, Severity
+from mavframecheck.model import ProofLines, Rule, Severity
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.commands import location_commands
 from mavframecheck.semantics.constants import constant
@@ -58,6 +58,12 @@ class CompiledRule:
     def validate(self) -> None:
         """Compile everything; RuleFileError names file, key and column of what cannot be."""
         _ = self.awaited, self.judged_by
+        for figure, lines in self.proofs:
+            parts = [part for line in lines.values() for part in self._with_lets(line)]
+            named = set().union(*(part.contexts | part.hoped | part.tested for part in parts))
+            if strange := sorted(named - self.spoken_of - ALWAYS_KNOWN):
+                message = f"{self._source}: proof: '{figure.title}' names {strange[0]}, which nothing else in the rule does"
+                raise RuleFileError(message)
 
     def may_judge(self, message: str) -> bool:
         """Return whether the rule can be about a message."""
@@ -127,6 +133,20 @@ class CompiledRule:
         return {
             key: self._template(text, f"evidence.{key}") for key, text in self.rule.evidence.items()
         }
+
+    @functools.cached_property
+    def proofs(self) -> list[tuple[ProofLines, dict[str, Expression]]]:
+        """What is drawn of the judged rows, and the expression of each line."""
+        return [
+            (
+                figure,
+                {
+                    label: self._expression(code, self._names, f"proof[{k}].lines.{label}")
+                    for label, code in figure.lines.items()
+                },
+            )
+            for k, figure in enumerate(self.rule.proof)
+        ]
 
     @functools.cached_property
     def required(self) -> frozenset[str]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import chain
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +24,9 @@ from mavframecheck.model import (
     Subject,
 )
 from mavframecheck.wire import Frames
+
+if TYPE_CHECKING:
+    from mavframecheck.model.trace import Figure
 
 MAX_EPISODES = 50
 """Episodes per rule and stream; what comes after counts into the last one."""
@@ -73,6 +77,8 @@ class Judged(NamedTuple):
     """Words for the hit at a place."""
     timeless: bool = False
     """Whether nothing says how far apart rows are: then a row that is right ends an episode."""
+    figures: Callable[[int], tuple[Figure, ...]] = lambda _: ()
+    """Drawings of a stream, once the recording is read."""
 
 
 @dataclass(slots=True)
@@ -90,6 +96,8 @@ class Episode:
     """Rows judged from the first hit to the last."""
     since: int = 0
     """Rows judged and found right since the last hit."""
+    figures: Callable[[], tuple[Figure, ...]] = tuple
+    """Draws what proves it."""
 
     @property
     def lasts(self) -> bool:
@@ -161,10 +169,15 @@ class Episodes:
         return {key: e for key, e in chain(collected, observed) if e.lasts}
 
     def findings(self) -> list[Finding]:
-        """Return the findings of all episodes that last, in order of their first frame."""
-        lasting = list(self.lasting().values())
-        lasting.sort(key=lambda e: (e.first.number, e.rule.rule.code, str(e.subject)))
-        return [self.finding(e) for e in lasting]
+        """Return the findings of all episodes that last."""
+        return [self.finding(each) for each in self.ordered()]
+
+    def ordered(self) -> list[Episode]:
+        """Return all episodes that last, in order of their first frame."""
+        return sorted(
+            self.lasting().values(),
+            key=lambda e: (e.first.number, e.rule.rule.code, str(e.subject)),
+        )
 
     def finding(self, episode: Episode) -> Finding:
         """Return an episode as a finding."""
@@ -235,6 +248,7 @@ def _add_run(
             badness=badness,
             count=len(hits),
             judged=length,
+            figures=functools.partial(judged.figures, int(judged.stream[hits[0]])),
         )
     )
 

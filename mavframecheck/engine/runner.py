@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+import functools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -19,6 +21,19 @@ from mavframecheck.model import Evidence, Finding, RuleRun, Scalar, Severity, Su
 from mavframecheck.vehicle import NAMES, Context
 from mavframecheck.vehicle.rows import Rows
 from mavframecheck.wire import Batch, Dialect
+
+if TYPE_CHECKING:
+    from mavframecheck.engine.proofs import Proofs
+    from mavframecheck.model.trace import Figure
+
+
+class Onlooker(Protocol):
+    """Who watches a recording being judged, for reports that draw."""
+
+    proofs: Proofs
+
+    def update(self, batch: Batch, context: Context) -> None:
+        """See a batch, before its context is forgotten."""
 
 
 @dataclass(slots=True)
@@ -90,11 +105,13 @@ class Runner:
         *,
         upload: Upload | None = None,
         only: int | None = None,
+        onlooker: Onlooker | None = None,
     ) -> None:
         """Judge the recording called `file` with `rules`, learning `context` on the way.
 
         With `upload` the file is a mission: only its items are judged, and findings are placed in its text.
         With `only`, judge what that sender says, and learn from everybody.
+        The `onlooker` sees every batch with its context, and keeps what rules draw.
         """
         self._rules = [rule for rule in rules if not rule.rule.detect.check]
         self._checks: list[tuple[CompiledRule, Check]] = [
@@ -107,6 +124,7 @@ class Runner:
         self._only = only
         self._context = context
         self._dialect = dialect
+        self._onlooker = onlooker
         self.episodes = Episodes(file, upload.locate if upload is not None else None)
         """What was found so far; of the Python checks, what they said when they were last asked."""
         self._judged = None if upload is None else {ITEM}
@@ -128,6 +146,8 @@ class Runner:
                     self._serve(desk, admitted, batch)
         for _, check in self._checks:
             check.update(batch, self._context)
+        if self._onlooker is not None:
+            self._onlooker.update(batch, self._context)
         self._context.settle()
 
     def finish(self) -> tuple[list[Finding], list[RuleRun]]:
@@ -158,13 +178,24 @@ class Runner:
 
     def _observe(self, rule: CompiledRule, check: Check) -> None:
         observed = [each for each in check.finish() if self._concerns(each.subject)]
-        self.episodes.observe(rule.rule.code, [_episode(rule, each) for each in observed])
+        found = [_episode(rule, each, self._drawn_by(check, each)) for each in observed]
+        self.episodes.observe(rule.rule.code, found)
+
+    def _drawn_by(self, check: Check, observation: Observation) -> Callable[[], tuple[Figure, ...]]:
+        """Return what draws the proof of an observation, where somebody will look at it."""
+        if self._onlooker is None:
+            return tuple
+        return functools.partial(check.figures, observation)
 
     def _concerns(self, subject: Subject) -> bool:
         """Return whether a finding is about a sender that is judged."""
         if self._only is None:
             return True
         return (subject.sysid, subject.compid) == (self._only >> 8, self._only & 0xFF)
+
+    def figures(self) -> list[tuple[Figure, ...]]:
+        """Return what proves each finding, once all is finished."""
+        return [episode.figures() for episode in self.episodes.ordered()]
 
     def _halls_for(self, message: str) -> list[_Hall]:
         """Return the rules on a message by whom they listen to."""
@@ -210,6 +241,10 @@ class Runner:
             if not inside.any():
                 continue
             looked[place] |= inside
+            if self._onlooker is not None and rule.rule.proof:
+                self._onlooker.proofs.record(
+                    rule, scope, (rows.table.name, label), rows.stream[place], inside
+                )
             found = inside & rule.flag(scope)
             if not found.any():
                 continue
@@ -257,8 +292,16 @@ class Runner:
             badness[places],
             subject,
             describe,
+            figures=functools.partial(self._figures_of, rule, (rows.table.name, label)),
         )
         self.episodes.collect(rule, rows.table.name, label, judged)
+
+    def _figures_of(
+        self, rule: CompiledRule, key: tuple[str, str | None], stream: int
+    ) -> tuple[Figure, ...]:
+        if self._onlooker is None:
+            return ()
+        return self._onlooker.proofs.figures(rule, key, stream)
 
     def _judge_ready(self, desk: _Desk, rows: Rows | None) -> None:
         """Judge rows; where context never came, those that a rule can judge without. Count the others."""
@@ -346,7 +389,9 @@ def _evidence(
         yield key, template.value(scope)
 
 
-def _episode(rule: CompiledRule, observation: Observation) -> Episode:
+def _episode(
+    rule: CompiledRule, observation: Observation, figures: Callable[[], tuple[Figure, ...]]
+) -> Episode:
     """Return an observation of a Python check as an episode."""
     values = {
         name: plain(value) if value is not None else None
@@ -362,6 +407,7 @@ def _episode(rule: CompiledRule, observation: Observation) -> Episode:
         words=words._replace(evidence=evidence),
         count=observation.times,
         judged=observation.times,
+        figures=figures,
     )
 
 

@@ -46,10 +46,10 @@ def survey_file(
             reading.context.update(batch)
             survey.update(batch, reading.context)
             reading.context.settle()
-        return _summary(reading, survey.finish(reading.vehicles()))
+        return summary(reading, survey.finish(reading.vehicles()))
 
 
-def _summary(reading: Reading, senders: tuple[SenderSurvey, ...]) -> FileSurvey:
+def summary(reading: Reading, senders: tuple[SenderSurvey, ...]) -> FileSurvey:
     """Put together what was read, with what the references named in it mean."""
     fields = [field for each in senders for field in _fields(each)]
     return FileSurvey(

@@ -91,6 +91,17 @@ class Explain(_Part, frozen=True):
     references: tuple[str, ...] = ()
 
 
+class ProofLines(_Part, frozen=True):
+    """A drawing of what was judged, for reports that draw: each line an expression over the judged rows."""
+
+    title: str
+    lines: dict[str, str]
+    """Words to expression; the first one is what is judged. They name no context that the rule does not."""
+    unit: str = ""
+    note: str = ""
+    """How to read it."""
+
+
 class Step(_Part, frozen=True):
     """One message of an example, or `repeat` of them `every` seconds apart."""
 
@@ -144,6 +155,7 @@ class Rule(_Part, frozen=True):
     params: dict[str, float | int | str | bool] = {}
     severity_when: tuple[SeverityWhen, ...] = ()
     evidence: dict[str, str] = {}
+    proof: tuple[ProofLines, ...] = ()
     example: tuple[Example, ...] = ()
 
     @property

@@ -10,9 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import import_module
-from typing import NamedTuple, TypeAlias, cast
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias, cast
 
 from mavframecheck.model import FileReport, Finding, Rule, Severity, Suppressed
+
+if TYPE_CHECKING:
+    from mavframecheck.model.trace import Detail
 
 
 class Checked(NamedTuple):
@@ -22,6 +25,8 @@ class Checked(NamedTuple):
     findings: tuple[Finding, ...]
     suppressed: tuple[Suppressed, ...] = ()
     """Findings that the user knows of and has set aside; they do not count."""
+    detail: Detail | None = None
+    """Curves, tracks and bytes; there only where a format draws."""
 
 
 class Remark(NamedTuple):
@@ -72,8 +77,11 @@ FORMATS = {
     "github": "mavframecheck.report.github",
     "gitlab": "mavframecheck.report.gitlab",
     "statistics": "mavframecheck.report.statistics",
+    "html": "mavframecheck.report.html",
 }
 """Name of each format and the module that writes it, imported when asked for."""
+DRAWN = frozenset({"html"})
+"""Formats that draw: what they show is only kept for them."""
 
 
 def load(name: str) -> Format:

@@ -77,9 +77,9 @@ class _Map(Page):
         for stream in sender.streams:
             shown = [view for view in stream.views if self._shown(view)]
             if not shown:
-                others.append(f"{stream.message} {_often(stream)}")
+                others.append(f"{stream.message} {often(stream)}")
             elif not self._every_field and _only_stamped(shown):
-                stamped.append(f"{stream.message} {_often(stream)}")
+                stamped.append(f"{stream.message} {often(stream)}")
             else:
                 yield ""
                 yield from self._stream(stream, shown)
@@ -99,7 +99,7 @@ class _Map(Page):
         return [field for field in fields if is_spatial(field)]
 
     def _stream(self, stream: StreamSurvey, shown: list[ViewSurvey]) -> Iterator[str]:
-        title = f"{stream.message}  {_often(stream)}"
+        title = f"{stream.message}  {often(stream)}"
         if len(stream.views) == 1:
             title += "".join(f", {text}" for text in _selectors(shown[0]))
         first, *rest = self.wrap(title + _instances(stream), "  ", "    ")
@@ -206,7 +206,7 @@ def _only_stamped(views: list[ViewSurvey]) -> bool:
     return len(spatial) == 1 and spatial[0].quantity == "timestamp"
 
 
-def _often(stream: StreamSurvey) -> str:
+def often(stream: StreamSurvey) -> str:
     """Return ``4.0 Hz (1234)``, or only the count."""
     if stream.rate_hz is None:
         return f"({stream.count})"

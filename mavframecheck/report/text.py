@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, groupby
 
 from mavframecheck.model import (
-    ByteLocation,
     FileReport,
     Finding,
     MissionLocation,
@@ -21,14 +20,12 @@ from mavframecheck.model.finding import MISSION_KINDS
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.layout import SEVERITY_COLOURS, Page
+from mavframecheck.report.told import evidence_rows, when
 from mavframecheck.report.verdict import Census, found, judged
 from mavframecheck.report.words import (
     component,
-    elapsed,
     intended,
-    is_number,
     plural,
-    scalar,
     what_was_read,
 )
 
@@ -151,9 +148,9 @@ def _stream(finding: Finding) -> Subject:
 
 def _finding(finding: Finding, file: FileReport, page: Page) -> Iterator[str]:
     yield from _title(finding, page)
-    yield from page.wrap(_when(finding, file), "    ", style="dim")
+    yield from page.wrap(when(finding, file), "    ", style="dim")
     yield from page.wrap(finding.text, "    ")
-    rows = _evidence(finding)
+    rows = evidence_rows(finding)
     column = min(max(len(label) for label, _ in rows), _WIDEST_LABEL) + 2
     for label, value in rows:
         yield from page.labelled(label, value, column)
@@ -167,66 +164,6 @@ def _title(finding: Finding, page: Page) -> Iterator[str]:
     plain = f"{finding.severity} {sentence(finding.code)}"
     yield first.replace(plain, page.paint(plain, SEVERITY_COLOURS[finding.severity]), 1)
     yield from rest
-
-
-def _when(finding: Finding, file: FileReport) -> str:
-    """Return how often, time since the start of the recording and UTC, and where in the file."""
-    often = f"{finding.count} times" if finding.count > 1 else "once"
-    times = [t for t in (finding.time_first, finding.time_last) if t is not None]
-    since = _span([elapsed(t - (file.time_start or t)) for t in times], "at ", "from ")
-    clock = _clock(finding.utc_first, finding.utc_last)
-    when = " ".join(filter(None, (often, since, f"({clock} UTC)" if clock else "")))
-    return ", ".join(filter(None, (when, _where(finding))))
-
-
-def _span(ends: list[str], one: str = "", two: str = "") -> str:
-    """Return ``a to b`` after the word `two`, or ``a`` after `one` when both are the same."""
-    distinct = list(dict.fromkeys(ends))
-    word = two if len(distinct) > 1 else one
-    return word + " to ".join(distinct) if distinct else ""
-
-
-def _clock(first: str | None, last: str | None) -> str:
-    """Return two UTC times to the second, their common day written once."""
-    ends = [
-        text.replace("T", " ").removesuffix("Z").split(".")[0] for text in (first, last) if text
-    ]
-    if len(ends) == 2 and ends[0] != ends[1] and ends[0][:11] == ends[1][:11]:
-        ends[1] = ends[1][11:]
-    return _span(ends)
-
-
-def _where(finding: Finding) -> str:
-    """Return the byte of the first hit, or line and item of a mission."""
-    match finding.location:
-        case ByteLocation(offset=offset):
-            return f"first at byte {offset}" if finding.count > 1 else f"byte {offset}"
-        case MissionLocation(line=line, column=column, item=item, command=command):
-            parts = (
-                f"line {line}" if line is not None else "",
-                f"column {column}" if column is not None else "",
-                f"item {item}" if item is not None else "",
-                command or "",
-            )
-            return ("first in " if finding.count > 1 else "") + ", ".join(filter(None, parts))
-    return ""
-
-
-def _evidence(finding: Finding) -> list[tuple[str, str]]:
-    """Return labels and values: expected and observed with their unit, the rest, the remedy."""
-    evidence = {key: scalar(value) for key, value in finding.evidence.items() if value is not None}
-    unit = evidence.pop("unit", "")
-    rows: list[tuple[str, str]] = []
-    for key in ("expected", "observed"):
-        if key in evidence:
-            value = evidence.pop(key)
-            rows.append((key, f"{value} {unit}".rstrip() if is_number(value) else value))
-    if unit and not any(value.endswith(f" {unit}") for _, value in rows):
-        rows.append(("unit", unit))
-    rows += [(sentence(key), value) for key, value in evidence.items()]
-    if finding.related:
-        rows.append(("against", ", ".join(finding.related)))
-    return [*rows, ("fix", finding.fix)]
 
 
 # ---- verdict ----

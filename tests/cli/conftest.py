@@ -42,6 +42,11 @@ class FakeEngine:
             raise answer
         return answer
 
+    def draw_file(self, *asked: Any) -> tuple[Any, ...]:
+        """Return the same, with nothing drawn."""
+        answer = self.check_file(*asked)
+        return answer.file, answer.findings, None
+
 
 @pytest.fixture
 def engine(monkeypatch: pytest.MonkeyPatch) -> FakeEngine:
@@ -49,6 +54,7 @@ def engine(monkeypatch: pytest.MonkeyPatch) -> FakeEngine:
     fake = FakeEngine()
     monkeypatch.setattr("mavframecheck.engine.load_pack", fake.load_pack)
     monkeypatch.setattr("mavframecheck.engine.check_file", fake.check_file)
+    monkeypatch.setattr("mavframecheck.engine.draw_file", fake.draw_file)
     return fake
 
 

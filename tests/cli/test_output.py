@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mavframecheck.report import FORMATS, Checked
+from mavframecheck.report import DRAWN, FORMATS, Checked
 from tests.cli.conftest import FakeEngine, Run
 from tests.report import made_up
 
@@ -23,7 +23,9 @@ def test_one_pass_gives_every_report(engine: FakeEngine, logs: Path, run: Run) -
     assert engine.checked == ["a.tlog", "b.tlog"]
     assert result.stdout_bytes == Path("report.text").read_bytes()
     assert len(json.loads(Path("report.json").read_bytes())["files"]) == 2
-    for form in FORMATS:
+    for page in sorted(Path("report").iterdir()):
+        assert f'href="report/{page.name}"' in Path("report.html").read_text("utf-8")
+    for form in FORMATS.keys() - DRAWN:
         alone = run("check", "a.tlog", "b.tlog", "--format", form).stdout_bytes
         assert Path(f"report.{form}").read_bytes() == alone
 
@@ -60,3 +62,14 @@ def test_full_disk_is_no_clean_run(engine: FakeEngine, logs: Path, run: Run) -> 
     """A report that cannot be written is said and counts."""
     result = run("check", "a.tlog", "--output", "json=/dev/full")
     assert (result.exit_code, "cannot write the report" in result.stderr) == (2, True)
+
+
+def test_report_writes_pages(engine: FakeEngine, logs: Path, run: Run) -> None:
+    """One recording is a page, several are an index and a page each; findings are no failure."""
+    engine.answers["a.tlog"] = FOUND
+    assert run("report", "a.tlog").exit_code == 0
+    assert "finding-1" in Path("report.html").read_text("utf-8")
+    result = run("report", "a.tlog", "b.tlog", "--output", "all.html")
+    assert (result.exit_code, result.stderr) == (0, "mavframecheck: wrote all.html\n")
+    assert [file.name[:4] for file in sorted(Path("all").iterdir())] == ["001-", "002-"]
+    assert run("report", "a.tlog", "--output", "missing/r.html").exit_code == 2

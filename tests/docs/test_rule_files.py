@@ -15,7 +15,14 @@ from mavframecheck.engine.examples import run_example
 from mavframecheck.engine.functions import FIELD_FUNCTIONS, FUNCTIONS
 from mavframecheck.engine.pack import load_pack
 from mavframecheck.model import Example, Rule, Step
-from mavframecheck.model.rule import Applies, Detect, Explain, Persist, SeverityWhen
+from mavframecheck.model.rule import (
+    Applies,
+    Detect,
+    Explain,
+    Persist,
+    ProofLines,
+    SeverityWhen,
+)
 from mavframecheck.vehicle import NAMES
 from samples.make import HERE
 
@@ -54,7 +61,7 @@ def test_own_names() -> None:
 
 
 @pytest.mark.parametrize(
-    "part", [Rule, Applies, Detect, Persist, SeverityWhen, Explain, Example, Step]
+    "part", [Rule, Applies, Detect, Persist, SeverityWhen, ProofLines, Explain, Example, Step]
 )
 def test_keys(part: type[msgspec.Struct]) -> None:
     """So is every key of every table."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.clocks import Seen
 from mavframecheck.vehicle.tracks import Source
 from mavframecheck.wire import Batch, Dialect
+
+if TYPE_CHECKING:
+    from mavframecheck.model.trace import Figure
 
 Values = dict[str, Scalar]
 
@@ -59,9 +62,20 @@ class MotionCheck(Check):
             "by_autopilot": subject.by_autopilot,
             **told,
         }
-        name = _rotation_field(track.source) if self.rotation or told.get("what") == "yaw" else None
-        whom = Whom(track.key.sender >> 8, track.key.sender & 0xFF, track.key.message, name)
+        whom = self._whom(subject, told)
         return Observation(whom, _place(track.first), _place(track.last), track.rows, values)
+
+    def _whom(self, subject: judging.Subject, told: Mapping[str, Scalar]) -> Whom:
+        track = subject.track
+        name = _rotation_field(track.source) if self.rotation or told.get("what") == "yaw" else None
+        return Whom(track.key.sender >> 8, track.key.sender & 0xFF, track.key.message, name)
+
+    def figures(self, observation: Observation) -> tuple[Figure, ...]:
+        """Return the stream beside the reference, as labelled and corrected."""
+        for subject in self._subjects():
+            if self._judge and self._whom(subject, observation.values) == observation.subject:
+                return self._judge.figures(subject, _about(observation.values))
+        return ()
 
     def verdict(self) -> Verdict:
         """Return the rows of streams that could be told, else what was missing."""
@@ -82,6 +96,13 @@ class MotionCheck(Check):
     @abstractmethod
     def told(self, subject: judging.Subject) -> Values | None:
         """Return the values for the rule's texts where the mistake is made."""
+
+
+def _about(told: Mapping[str, Scalar]) -> str:
+    """Return which conclusion about a stream the values of a finding are from."""
+    if told.get("measured_in") == "m":
+        return "speed" if told.get("what") == "velocity" else "place"
+    return "lie" if told.get("measured_in") == "degrees" else "twist"
 
 
 def _rotation_field(source: Source) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import weakref
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,9 @@ from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.tracks import Track, Tracks
 from mavframecheck.wire import Batch, Table
+
+if TYPE_CHECKING:
+    from mavframecheck.model.trace import Figure
 
 Floats = npt.NDArray[np.float64]
 
@@ -151,6 +154,21 @@ class Judge:
     def timed(self) -> bool:
         """Whether there are receive times."""
         return self._tracks.timed
+
+    def figures(self, subject: Subject, about: str) -> tuple[Figure, ...]:
+        """Return what proves the conclusion about the ``place``, ``speed``, ``lie`` or ``twist`` of a stream."""
+        from mavframecheck.checks.motion import figures
+
+        stream, truth = self.series(subject.track), self._truth(subject.system, subject.track)
+        told, t0_s = getattr(subject, about), (self._tracks.t0_us or 0) * 1e-6
+        if isinstance(told, axes.Fit) and truth.place is not None:
+            moved = stream.integrated(truth.rate) if about == "speed" else stream
+            return tuple(figures.of_axes(told, subject.frame, moved, truth.place, t0_s))
+        if isinstance(told, attitudes.Lie) and truth.attitude is not None:
+            return tuple(figures.of_attitude(told, stream, truth.attitude, t0_s))
+        if isinstance(told, twist.Twist) and truth.place is not None and truth.attitude is not None:
+            return tuple(figures.of_twist(told, stream, truth.place, truth.attitude, t0_s))
+        return ()
 
     @functools.cached_property
     def subjects(self) -> list[Subject]:

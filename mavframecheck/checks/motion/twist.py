@@ -39,6 +39,22 @@ class Twist(NamedTuple):
     times: tuple[float, float]
     told: frozenset[str] = frozenset()
     """Readings that would have shown: they differ from the label for long enough."""
+    label: str = ""
+    """``body`` or ``world``."""
+    yaw: float = 0.0
+    delay_s: float = 0.0
+    rate: float = 1.0
+    """What it was compared with: see `compare`."""
+
+
+class Readings(NamedTuple):
+    """The velocity in world axes by each reading, and the true one; (n, 3) m/s, NED."""
+
+    at: Floats
+    by_name: dict[str, Floats]
+    true: Floats
+    times: tuple[float, float]
+    """First and last time at which there was a sample."""
 
 
 _SAYS = {
@@ -66,6 +82,20 @@ def compare(
     `place` and `attitude` are the references, `yaw` the heading of the stream's frame, `rate` seconds of
     the vehicle per second of receive time.
     """
+    label = "body" if body else "world"
+    read = readings(stream, place, attitude, yaw=yaw, delay_s=delay_s, rate=rate)
+    if len(read.at) < MIN_TELLING:
+        return "the vehicle hardly moves"
+    turn = _choose(read.by_name, read.true, label, read.times)
+    if isinstance(turn, str):
+        return turn
+    return turn._replace(label=label, yaw=yaw, delay_s=delay_s, rate=rate)
+
+
+def readings(
+    stream: Series, place: Series, attitude: Series, *, yaw: float, delay_s: float, rate: float
+) -> Readings:
+    """Return the velocity of `stream` as it may be meant, at moments at which the vehicle moves."""
     at = stream.t[np.diff(np.floor(stream.t / GRID_S), prepend=-np.inf) > 0]
     true = place.steps(at - delay_s, SPAN_S) / (SPAN_S * rate)
     given = _smoothed(stream, at)
@@ -73,13 +103,11 @@ def compare(
     fine = np.isfinite(true).all(axis=1) & np.isfinite(given).all(axis=1)
     fine &= np.isfinite(lies).all(axis=1)
     fine &= np.linalg.norm(np.nan_to_num(true), axis=1) > MIN_MPS
-    if np.count_nonzero(fine) < MIN_TELLING:
-        return "the vehicle hardly moves"
     v, r, t = given[fine], lies[fine], true[fine]
-    scale = float(np.linalg.norm(v) / np.linalg.norm(t))
+    scale = float(np.linalg.norm(v) / np.linalg.norm(t)) if len(t) else 0.0
     v = v / scale if scale > 0 else v
     world = yaw_matrix(-yaw)
-    readings = {
+    by_name = {
         "body": q4.turn_by(r, v),
         "world": v @ world.T,
         "level": q4.turn_by(q4.about_z(q4.euler_from_quaternion(r)[:, 2]), v),
@@ -87,7 +115,8 @@ def compare(
         "flu": q4.turn_by(r, v @ _FLU),
         "enu": v @ _ENU.T,
     }
-    return _choose(readings, t, "body" if body else "world", (float(at[0]), float(at[-1])))
+    times = (float(at[0]), float(at[-1])) if len(at) else (0.0, 0.0)
+    return Readings(at[fine], by_name, t, times)
 
 
 def _smoothed(stream: Series, at: Floats) -> Floats:
