@@ -93,6 +93,11 @@ class _Open:
             self.parts.append(items_of(table.take(picked).compact()))
         self.rows.clear()
 
+    @property
+    def says_something(self) -> bool:
+        """Whether items came, or all are to be removed."""
+        return bool(self.kept) or self.count == 0
+
     def is_begun_by(self, frames: Frames, row: int, count: int | None) -> bool:
         """Return whether a beginning is the one of this transaction, heard over a second link."""
         return int(frames.seq[row]) == int(self.began.seq[0]) and count == self.count
@@ -139,9 +144,10 @@ class Transactions:
             transaction.settle()
 
     def finish(self) -> Iterator[Mission]:
-        """Yield the missions whose transaction never ended."""
-        for key in list(self._open):
-            yield from self._close(key)
+        """Yield the missions whose transaction never ended; more of them may come after all."""
+        for key, transaction in self._open.items():
+            if transaction.says_something:
+                yield transaction.mission(key)
 
     def _count(self, table: Table, row: int) -> Iterator[Mission]:
         return self._begin(table, row, int(table["count"][row]))
@@ -198,7 +204,7 @@ class Transactions:
 
     def _close(self, key: Key) -> Iterator[Mission]:
         transaction = self._open.pop(key, None)
-        if transaction is not None and (transaction.kept or transaction.count == 0):
+        if transaction is not None and transaction.says_something:
             yield transaction.mission(key)
 
 

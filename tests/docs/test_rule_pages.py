@@ -36,7 +36,10 @@ def test_page_has_all_parts(name: str) -> None:
     parts = re.findall(r"^## (.+)$", WRITTEN[name], re.MULTILINE)
     wanted = ["Why it matters", "How to mend it", "Example", "What it looks for", "References"]
     assert [part for part in parts if part in wanted] == wanted
-    assert re.search(r"^(header|bytes)( +[0-9a-f]{2})+", WRITTEN[name], re.MULTILINE)
+    of_a_mission = "example.plan" in WRITTEN[name]
+    assert of_a_mission or re.search(
+        r"^(header|bytes)( +[0-9a-f]{2})+", WRITTEN[name], re.MULTILINE
+    )
     code = name.removesuffix(".md")
     assert f"$ mavframecheck check --select {code}" in WRITTEN[name]
     assert re.search(rf"^  (error|warning|info) {code} ", WRITTEN[name], re.MULTILINE)

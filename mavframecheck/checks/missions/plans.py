@@ -88,9 +88,13 @@ class Plans:
         self._vehicles: dict[int, tuple[str, int]] = {}
         """System -> family and MAV_TYPE, as first said."""
         self._missions: list[Mission] = []
+        self._unfinished: list[Mission] = []
+        """Those that may go on, as far as they were sent when they were last asked for."""
         self._items = 0
         self._contents: dict[bytes, Items] = {}
         self._roles: dict[int, str] = {}
+        self._finished: list[Plan] | None = None
+        """What `finished` found, until more is read."""
         self.intended: list[Plan] = []
         """The plan that was given beside the recording, if any."""
 
@@ -114,6 +118,7 @@ class Plans:
         if self._batch is not None and self._batch() is batch:
             return
         self._batch = weakref.ref(batch)
+        self._finished = None
         told = batch.tables.get("HOME_POSITION")
         if told is not None:
             _remember(self._homes, told, told["altitude"].astype(float) * 1e-3)
@@ -133,15 +138,13 @@ class Plans:
 
     def _keep(self, mission: Mission) -> None:
         """Keep a mission; what has the same content shares it."""
-        content = _content(mission.items)
         if len(self._missions) >= MAX_MISSIONS or self._items >= MAX_ITEMS:
             return
-        if content in self._contents:
-            mission.items = self._contents[content]
-        else:
+        content = _content(mission.items)
+        if content not in self._contents:
             self._contents[content] = mission.items
             self._items += len(mission.items)
-        self._missions.append(mission)
+        self._missions.append(self._shared(mission))
         self._roles.setdefault(mission.sender, "unknown")
 
     def finished(self, context: Context) -> list[Plan]:
@@ -149,11 +152,24 @@ class Plans:
 
         What a vehicle only sends back as it got it is left out.
         """
-        for mission in self._transactions.finish():
-            self._keep(mission)
-            self._roles[mission.sender] = context.role(mission.sender)
+        if self._finished is None:
+            self._unfinished = [self._shared(each) for each in self._transactions.finish()]
+            self._roles |= {each.sender: context.role(each.sender) for each in self._unfinished}
+            self._finished = self._concluded()
+        return self._finished
+
+    @property
+    def _all(self) -> list[Mission]:
+        return [*self._missions, *self._unfinished]
+
+    def _shared(self, mission: Mission) -> Mission:
+        """Return a mission that shares its items with one of the same content."""
+        mission.items = self._contents.get(_content(mission.items), mission.items)
+        return mission
+
+    def _concluded(self) -> list[Plan]:
         once: dict[tuple[int, int, int, int], Mission] = {}
-        for mission in self._missions:
+        for mission in self._all:
             key = (mission.sender, mission.target, mission.mission_type, id(mission.items))
             if len(mission.items):
                 once.setdefault(key, mission)
@@ -172,7 +188,7 @@ class Plans:
         """Return the frame number at which a vehicle got another mission than `plan`, infinity if it never did."""
         later = [
             mission.ended
-            for mission in self._missions
+            for mission in self._all
             if mission.target == plan.vehicle
             and mission.mission_type in (MISSION, ALL_KINDS)
             and mission.ended > plan.mission.ended
@@ -183,7 +199,7 @@ class Plans:
     def readbacks(self) -> list[Readback]:
         """Return what vehicles sent back, with what they should have held."""
         ledger = Ledger(lambda sender: self._roles[sender] == "autopilot")
-        return ledger.enter(self._missions).readbacks
+        return ledger.enter(self._all).readbacks
 
     def family(self, system: int) -> str:
         """Return the autopilot family of a system, empty where nobody said."""
