@@ -41,13 +41,13 @@ def constant(name: str) -> int:
 
 
 def entry_name(enum: str, value: int) -> str:
-    """Return the short name of a value, or the value as text when it has no name."""
+    """Return the short name of a value, or the value as text when no table here names it."""
     return _names(enum).get(value, str(value))
 
 
 @cache
 def _names(enum: str) -> dict[int, str]:
-    return {value: name for name, value in entries(enum).items()}
+    return {value: name for name, value in _enumerations().get(enum, {}).items()}
 
 
 def _unknown(what: str, name: str, known: dict[str, dict[str, int]] | dict[str, int]) -> str:

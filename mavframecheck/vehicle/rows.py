@@ -212,9 +212,8 @@ class Rows:
         values = self.raw(field).tolist()
         if enum in masks.mask_enums():
             return ["; ".join(masks.words(enum, value)) for value in values]
-        if not enum:
-            return [str(value) for value in values]
-        return [f"{value} ({entry_name(enum, value)})" for value in values]
+        named = [(str(value), entry_name(enum, value)) for value in values]
+        return [f"{value} ({name})" if name != value else value for value, name in named]
 
     def cached(self, key: tuple[object, ...], compute: Callable[[], T]) -> T:
         """Return what `compute` gives, computed once for `key`."""

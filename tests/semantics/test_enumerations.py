@@ -21,6 +21,7 @@ from mavframecheck.semantics import (
     mode_name,
 )
 from mavframecheck.semantics.commands import all_commands
+from mavframecheck.semantics.constants import entry_name
 from mavframecheck.semantics.enums import FrameKind, FrameStatus, MaskSense
 from mavframecheck.semantics.masks import (
     bits,
@@ -292,6 +293,14 @@ def test_names_for_people() -> None:
         ("QUADROTOR", "PX4", "ONBOARD_COMPUTER")
     )
     assert type_name(250) == "250"
+
+
+def test_every_tagged_value_can_be_said() -> None:
+    """A field may be tagged with an enumeration whose names are not shipped: its numbers stay numbers."""
+    for tag in all_tags():
+        if tag.enum:
+            assert entry_name(tag.enum, 250)
+    assert entry_name("MAV_ODID_HOR_ACC", 3) == "3"
 
 
 def test_conventions_explain_every_word() -> None:
