@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, get_args
@@ -63,7 +63,6 @@ _OPTIONS = (
         metavar="NAME|FILE.xml",
         help=f"{DIALECT_HELP}  [default: ardupilotmega]",
     ),
-    input_kind_option,
     click.option(
         "--set",
         "assignments",
@@ -72,15 +71,6 @@ _OPTIONS = (
         help="Change a parameter of a rule ('mavframecheck rule CODE' lists them). Repeatable.",
     ),
     rules_option,
-    click.option(
-        "--baseline",
-        metavar="FILE",
-        type=click.Path(dir_okay=False, path_type=Path),
-        help="Leave out the findings that this file lists.",
-    ),
-    click.option(
-        "--update-baseline", is_flag=True, help="Write all that is found now to the baseline."
-    ),
     click.option(
         "--config",
         "config_file",
@@ -96,9 +86,32 @@ _OPTIONS = (
 )
 
 
+_OF_FILES = (
+    input_kind_option,
+    click.option(
+        "--baseline",
+        metavar="FILE",
+        type=click.Path(dir_okay=False, path_type=Path),
+        help="Leave out the findings that this file lists.",
+    ),
+    click.option(
+        "--update-baseline", is_flag=True, help="Write all that is found now to the baseline."
+    ),
+)
+
+
 def settings_options(command: Command) -> Command:
-    """Give a command the options that `choose` reads."""
-    for option in reversed(_OPTIONS):
+    """Give a command that judges files the options that `choose` reads."""
+    return judging_options(_given(command, _OF_FILES))
+
+
+def judging_options(command: Command) -> Command:
+    """Give a command those of them that say which rules run, and what to assume."""
+    return _given(command, _OPTIONS)
+
+
+def _given(command: Command, options: Sequence[Callable[[Command], Command]]) -> Command:
+    for option in reversed(options):
         command = option(command)
     return command
 
@@ -124,10 +137,10 @@ def choose(
     *,
     isolated: bool,
     directories: tuple[Path, ...],
-    baseline: Path | None,
-    update_baseline: bool,
-    input_kind: str | None,
     assignments: tuple[str, ...],
+    baseline: Path | None = None,
+    update_baseline: bool = False,
+    input_kind: str | None = None,
     **options: Any,
 ) -> Chosen:
     """Return what holds; a mistake in the file or on the command line is a usage error."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from mavframecheck.cli.judging import engine_settings, judging_options
-from mavframecheck.cli.options import load_rules
+from mavframecheck.cli.output import echo, lines
+from mavframecheck.cli.settings import choose, judging_options, shown
 from mavframecheck.model import Severity
 
 _EXAMPLE = """\
@@ -103,9 +103,8 @@ def watch(
     notify: str | None,
     form: str,
     plain: bool,
-    fail_on: str,
-    directories: tuple[Path, ...],
-    **chosen: Any,
+    show_settings: bool,
+    **options: Any,
 ) -> None:
     """Judge links to vehicles while they are up. Nothing is sent to them.
 
@@ -115,6 +114,9 @@ def watch(
     Exit codes: 0 clean, 1 findings at or above --fail-on, 2 wrong usage or a link that cannot be had,
     3 nothing could be decoded.
     """
+    if show_settings:
+        echo(lines(shown(choose(**options))))
+        return
     if not links and not files:
         click.echo(_EXAMPLE, err=True, nl=False)
         ctx.exit(2)
@@ -124,8 +126,7 @@ def watch(
         raise click.UsageError("--notify sends to udpout:HOST:PORT or tcp:HOST:PORT")
     from mavframecheck.cli.watching import Wishes, watched
 
-    pack = load_rules(directories)
-    settings = engine_settings(pack, **chosen)
+    chosen = choose(**options)
     wishes = Wishes(
         links=links,
         files=files,
@@ -135,6 +136,7 @@ def watch(
         exit_on=None if exit_on is None else Severity(exit_on),
         expect=expect,
         notify=notify,
-        fail_on=Severity(fail_on),
+        fail_on=chosen.fail_on,
     )
-    ctx.exit(watched(wishes, pack, settings, form="plain" if plain and form == "text" else form))
+    form = "plain" if plain and form == "text" else form
+    ctx.exit(watched(wishes, chosen.pack, chosen.settings, form=form))
