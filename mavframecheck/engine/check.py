@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavframecheck.checks import load_check
 from mavframecheck.checks.missions.plans import Plans
-from mavframecheck.engine.compiled import CompiledRule, Pack
+from mavframecheck.engine.compiled import Pack
 from mavframecheck.engine.pack import chosen_rules
 from mavframecheck.engine.reading import Progress, Reading
 from mavframecheck.engine.runner import Onlooker, Runner
@@ -130,7 +129,7 @@ def check_mission(
     planned = read_mission(file)
     upload = Upload(planned, dialect, settings.autopilot)
     chosen = chosen_rules(pack, settings)
-    rules = [rule for rule in chosen if _of_missions(rule)]
+    rules = [rule for rule in chosen if rule.may_judge(ITEM)]
     runner = Runner(file.name, rules, Context(), dialect, upload=upload)
     runner.update(upload.batch)
     findings, runs = runner.finish()
@@ -165,12 +164,6 @@ def _upload_of(path: str, settings: Settings, dialect: Dialect) -> Upload:
             return Upload(read_mission(file), dialect, settings.autopilot)
     except NoRecordingError as error:  # what is asked for is a setting, not a file to judge
         raise SourceError(f"--plan: {error}") from error
-
-
-def _of_missions(rule: CompiledRule) -> bool:
-    """Return whether a rule can be about mission items."""
-    check = rule.rule.detect.check
-    return load_check(check).of_missions if check else rule.may_judge(ITEM)
 
 
 def _vehicles(upload: Upload) -> tuple[Vehicle, ...]:

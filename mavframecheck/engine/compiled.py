@@ -9,8 +9,10 @@ from typing import Any
 
 import msgspec
 
+from mavframecheck.checks import load_check
 from mavframecheck.engine.expression import ANY_NAME, Expression, ExpressionError, RuleFileError
 from mavframecheck.engine.template import Template
+from mavframecheck.missions.upload import ITEM
 from mavframecheck.model import ProofLines, Rule, Severity
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.commands import location_commands
@@ -66,8 +68,12 @@ class CompiledRule:
                 raise RuleFileError(message)
 
     def may_judge(self, message: str) -> bool:
-        """Return whether the rule can be about a message."""
-        return message in self._binds if self._binds is not None else bool(bind(self, message))
+        """Return whether the rule can be about a message; a Python check: whether it judges mission items."""
+        if self._binds is not None:
+            return message in self._binds
+        if self.rule.detect.check:
+            return message in bound_messages(self)
+        return bool(bind(self, message))
 
     @functools.cached_property
     def lets(self) -> dict[str, Expression]:
@@ -264,7 +270,9 @@ def bind(rule: CompiledRule, message: str) -> tuple[Binding, ...]:
 
 
 def bound_messages(rule: CompiledRule) -> tuple[str, ...]:
-    """Return every message that a rule can be about, sorted."""
+    """Return every message that a rule can be about, sorted; of a Python check only whether it is mission items."""
+    if rule.rule.detect.check:
+        return (ITEM,) if load_check(rule.rule.detect.check).of_missions else ()
     named = {name for name in rule.rule.applies.message if not name.startswith("!")}
     return tuple(sorted(m for m in {*catalogue.messages(), *named} if bind(rule, m)))
 

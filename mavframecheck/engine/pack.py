@@ -78,13 +78,13 @@ def compile_rule(
     if bool(rule.detect.flag) == bool(rule.detect.check):
         message = f"{source}: detect needs either flag or check"
         raise RuleFileError(message)
-    if rule.detect.check:
+    if rule.detect.check and binds is None:
         try:
             load_check(rule.detect.check)
         except LookupError as error:
             message = f"{source}: detect.check: {error}"
             raise RuleFileError(message) from error
-    elif not (rule.applies.message or rule.applies.tag):
+    if not (rule.detect.check or rule.applies.message or rule.applies.tag):
         message = f"{source}: applies needs message or tag"
         raise RuleFileError(message)
     return CompiledRule(rule, params, source, binds, speaks_of)
