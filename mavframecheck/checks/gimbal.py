@@ -11,9 +11,11 @@ import numpy.typing as npt
 
 from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
 from mavframecheck.geo import quaternions as q4
+from mavframecheck.geo.rotations import wrapped
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
+from mavframecheck.vehicle.tracks import first_in_each
 from mavframecheck.wire import Batch, Dialect, Table
 
 Floats = npt.NDArray[np.float64]
@@ -59,8 +61,7 @@ class _Gimbal:
     def add(self, t_us: npt.NDArray[np.int64], yaw: Floats, heading: Floats) -> None:
         """Add reports, each beside the heading of the vehicle (rad)."""
         bins = t_us // BIN_US
-        highest = np.maximum.accumulate(np.maximum(bins, self.bin))
-        taken = np.flatnonzero(np.diff(highest, prepend=self.bin) > 0)
+        taken = first_in_each(bins, self.bin)
         if not len(taken):
             return
         known = self.bin >= 0
@@ -68,7 +69,7 @@ class _Gimbal:
         gimbal = np.concatenate(([self.yaw], yaw[taken]))[0 if known else 1 :]
         vehicle = np.concatenate(([self.heading], heading[taken]))[0 if known else 1 :]
         near = np.diff(t) <= APART_US
-        turn, swing = _wrapped(np.diff(vehicle))[near], _wrapped(np.diff(gimbal))[near]
+        turn, swing = wrapped(np.diff(vehicle))[near], wrapped(np.diff(gimbal))[near]
         self.turned += float(np.abs(turn).sum())
         self.both += float(turn @ swing)
         self.squares += float(turn @ turn)
@@ -155,8 +156,3 @@ class YawFrame(Check):
         if self._gimbals and not told:
             return Verdict(0, "the vehicle hardly turns")
         return Verdict(told)
-
-
-def _wrapped(angle: Floats) -> Floats:
-    turned: Floats = np.angle(np.exp(1j * angle))
-    return turned

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.geo.rotations import wrapped
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.tags import FieldTag
@@ -58,7 +59,7 @@ class _Stream:
     def add(self, said: Floats, yaw: Floats, where: tuple[Place, Place]) -> None:
         """Add headings as said (rad, by their label) and the yaw of the vehicle (rad)."""
         factors = np.array(list(READINGS.values()))[:, None]
-        off = np.abs(_wrapped(said * factors - yaw))
+        off = np.abs(wrapped(said * factors - yaw))
         self.rows += len(said)
         self.off += off.sum(axis=1)
         self.seen[(np.degrees(yaw) % 360 // (360 / SECTORS)).astype(np.int64) % SECTORS] = True
@@ -128,9 +129,3 @@ class Scale(Check):
         if self._streams and not judged:
             return Verdict(0, "insufficient motion: the vehicle hardly turned")
         return Verdict(judged)
-
-
-def _wrapped(angle: Floats) -> Floats:
-    """Return angles in -pi..pi, rad."""
-    wrapped: Floats = (angle + np.pi) % (2 * np.pi) - np.pi
-    return wrapped

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.geo.rotations import wrapped
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
@@ -450,7 +451,7 @@ class ZeroYaw(SetpointCheck):
         both = (mask & YAW_RATE == 0) & (table["yaw_rate"] == 0) & (mask != 0)
         ignored = mask & ACCELERATION == ACCELERATION
         shifted = (mask & FORCE != 0) & ignored & (mask & YAW_RATE != 0)
-        away = np.abs(_wrapped(yaw)) > np.radians(self.params["min_turn_deg"])
+        away = np.abs(wrapped(yaw)) > np.radians(self.params["min_turn_deg"])
         rows = np.flatnonzero((table["yaw"] == 0) & away & (both | shifted))
         if len(rows):
             first, last = (place(table.frames, int(rows[k])) for k in (0, -1))
@@ -488,7 +489,7 @@ class ZeroYaw(SetpointCheck):
     ) -> None:
         """Take in one leg: its course and the yaw that goes with it, rad."""
         if yaw != 0:
-            ahead = abs(float(_wrapped(np.array(yaw - course)))) < np.radians(
+            ahead = abs(float(wrapped(np.array(yaw - course)))) < np.radians(
                 self.params["nose_first_deg"]
             )
             legs.nose_first |= ahead
@@ -527,8 +528,3 @@ class ZeroYaw(SetpointCheck):
             (lat - here["lat"]) * DEGREE_M,
             turn * DEGREE_M * shrink,
         )
-
-
-def _wrapped(angle: Floats) -> Floats:
-    """Return angles in -pi..pi, rad."""
-    return np.asarray(np.arctan2(np.sin(angle), np.cos(angle)))

@@ -23,6 +23,8 @@ MAX_IDS = 1000
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
+_SLOTS = 2**20 - 1
+"""Keys that may be equal are told by this many slots: a table that fits into the cache."""
 
 
 class _Span:
@@ -323,9 +325,6 @@ class DuplicatedTraffic(Check):
     def verdict(self) -> Verdict:
         """Return the frames looked at."""
         return Verdict(sum(self._frames.values()))
-
-
-_SLOTS = 2**20 - 1
 
 
 def _keys(frames: Frames, rows: Ints) -> Ints:

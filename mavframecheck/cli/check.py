@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
-import msgspec
 
 from mavframecheck.cli.output import deliver, echo, lines, page_context, parse_outputs
 from mavframecheck.cli.settings import choose, settings_options, shown
@@ -112,8 +111,7 @@ def check(
     if not (paths or watch):
         click.echo(_EXAMPLE, err=True, nl=False)
         ctx.exit(2)
-    chosen = choose(**options)
-    chosen = chosen._replace(settings=msgspec.structs.replace(chosen.settings, plan=plan))
+    chosen = choose(plan=plan, **options)
     if diff:
         _show_diff(ctx, paths, chosen)
     form = "statistics" if statistics else form or _default_format()

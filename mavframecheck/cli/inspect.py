@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
-from mavframecheck.cli.clocks import ClockTable
 from mavframecheck.cli.contract import ContractText
 from mavframecheck.cli.missions import FORMATS as MISSION_FORMATS
 from mavframecheck.cli.missions import MissionTable, export_paths
 from mavframecheck.cli.options import dialect_option, input_kind_option
-from mavframecheck.cli.output import echo, page_context
+from mavframecheck.cli.output import page_context
 from mavframecheck.cli.positions import FORMATS, Positions, Wish, position_options
 from mavframecheck.cli.sender import Integration, parse_sender
-from mavframecheck.report import Context
+from mavframecheck.cli.views import Clocks, Map, Origins, View
 from mavframecheck.report.escape import sentence
-
-if TYPE_CHECKING:
-    from mavframecheck.engine import Settings
-    from mavframecheck.model.origins import FileOrigins
-    from mavframecheck.model.survey import FileSurvey
 
 _PIPE_WIDTH = 100
 """Columns for a pipe: tables need more room than sentences."""
@@ -129,75 +122,18 @@ def inspect(
         raise click.UsageError(f"--format {form} goes with --missions")
     export_paths(paths, form)
     chosen = next((view for view, asked in wanted.items() if asked), "map")
-    view = VIEWS[chosen](settings, messages)
+    wanted_messages = _known(messages, dialect) if chosen == "map" else messages
+    view = VIEWS[chosen](settings, wanted_messages, every_field=every_field)
     context = page_context()
     if not context.terminal:
         context = context._replace(width=_PIPE_WIDTH)
-    ctx.exit(view.show(paths, form or "text", context, every_field=every_field))
+    ctx.exit(view.show(paths, form or "text", context))
 
 
-class _Map:
-    """What each message means, field by field."""
-
-    def __init__(self, settings: Settings, messages: tuple[str, ...]) -> None:
-        self._settings = settings
-        self._messages = _known(messages, settings.dialect)
-
-    def show(
-        self, paths: tuple[str, ...], form: str, context: Context, *, every_field: bool
-    ) -> int:
-        """Write the map of each file; return the exit code."""
-        from mavframecheck.cli.files import Files
-        from mavframecheck.report.survey import render_json, render_text
-
-        files = Files(paths, self._read)
-        if form == "json":
-            echo(render_json(files.results(), context))
-        else:
-            every_field = every_field or bool(self._messages)
-            echo(render_text(files.results(), context, every_field=every_field))
-        return files.exit_code()
-
-    def _read(self, path: str, advance: Callable[[int], None] | None) -> tuple[FileSurvey, int]:
-        from mavframecheck.engine.survey import survey_file
-
-        survey = survey_file(path, self._settings, self._messages, advance)
-        return survey, survey.messages
-
-
-class _Origins:
-    """Where local positions and heights above home count from."""
-
-    def __init__(self, settings: Settings, messages: tuple[str, ...]) -> None:
-        if messages:
-            raise click.UsageError("--message does not go with --origins")
-        self._settings = settings
-
-    def show(
-        self, paths: tuple[str, ...], form: str, context: Context, *, every_field: bool
-    ) -> int:
-        """Write the registry of each file; return the exit code."""
-        from mavframecheck.cli.files import Files
-        from mavframecheck.report.origins import render_json, render_text
-
-        if every_field:
-            raise click.UsageError("--all does not go with --origins")
-        files = Files(paths, self._read)
-        render = render_json if form == "json" else render_text
-        echo(render(files.results(), context))
-        return files.exit_code()
-
-    def _read(self, path: str, advance: Callable[[int], None] | None) -> tuple[FileOrigins, int]:
-        from mavframecheck.engine.origins import origins_of_file
-
-        found = origins_of_file(path, self._settings, advance)
-        return found, found.messages
-
-
-VIEWS: dict[str, type[_Map | _Origins | ClockTable | Integration | ContractText | MissionTable]] = {
-    "map": _Map,
-    "origins": _Origins,
-    "clocks": ClockTable,
+VIEWS: dict[str, type[View[Any]]] = {
+    "map": Map,
+    "origins": Origins,
+    "clocks": Clocks,
     "sender": Integration,
     "contract": ContractText,
     "missions": MissionTable,

@@ -2,54 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import click
 
 from mavframecheck.cli.output import echo
+from mavframecheck.cli.views import Advance, View
 from mavframecheck.report import Context
 
 if TYPE_CHECKING:
-    from mavframecheck.engine import Settings
     from mavframecheck.model.missions import FileMissions, HeldMission
+    from mavframecheck.report.layout import FilePage
 
 FORMATS = ("plan", "waypoints")
 """Formats that other programs load."""
 
 
-class MissionTable:
+class MissionTable(View["FileMissions"]):
     """The missions of recordings."""
 
-    def __init__(self, settings: Settings, messages: tuple[str, ...]) -> None:
-        """Read recordings as `settings` say."""
-        if messages:
-            raise click.UsageError("--message does not go with --missions")
-        self._settings = settings
+    option = "--missions"
 
-    def show(
-        self, paths: tuple[str, ...], form: str, context: Context, *, every_field: bool
-    ) -> int:
-        """Write the missions of each file; return the exit code."""
+    def show(self, paths: tuple[str, ...], form: str, context: Context) -> int:
+        """Write the missions of each file, or what the only vehicle holds as a mission file."""
+        if form not in FORMATS:
+            return super().show(paths, form, context)
         from mavframecheck.cli.files import Files
-        from mavframecheck.report.missions import render_json, render_text
 
-        if every_field:
-            raise click.UsageError("--all does not go with --missions")
-        files = Files(paths, self._read)
-        if form in FORMATS:
-            for found in list(files.results()):
-                echo(iter([_exported(found, form)]))
-            return files.exit_code()
-        render = render_json if form == "json" else render_text
-        echo(render(files.results(), context))
+        files = Files(paths, self.counted)
+        for found in list(files.results()):
+            echo(iter([_exported(found, form)]))
         return files.exit_code()
 
-    def _read(self, path: str, advance: Callable[[int], None] | None) -> tuple[FileMissions, int]:
+    def read(self, path: str, advance: Advance) -> FileMissions:
+        """Return the missions of one recording."""
         from mavframecheck.engine.missions import missions_of_file
 
-        found = missions_of_file(path, self._settings, advance)
-        return found, found.messages
+        return missions_of_file(path, self.settings, advance)
+
+    def page(self, context: Context) -> FilePage[FileMissions]:
+        """Return the page of transfers and missions."""
+        from mavframecheck.report.missions import MissionPage
+
+        return MissionPage(context)
 
 
 def export_paths(paths: tuple[str, ...], form: str | None) -> None:

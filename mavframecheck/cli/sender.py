@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import click
 
-from mavframecheck.cli.output import echo
+from mavframecheck.cli.views import Advance, View
 from mavframecheck.report import Context
 from mavframecheck.report.escape import sentence
 
 if TYPE_CHECKING:
-    from mavframecheck.engine import Settings
     from mavframecheck.model.integration import FileIntegration
+    from mavframecheck.report.layout import FilePage
 
 
 def parse_sender(_ctx: click.Context, _param: click.Parameter, value: str | None) -> int | None:
@@ -28,34 +27,20 @@ def parse_sender(_ctx: click.Context, _param: click.Parameter, value: str | None
     return int(parts[0]) << 8 | int(parts[1])
 
 
-class Integration:
-    """The steps for one sender in recordings."""
+class Integration(View["FileIntegration"]):
+    """The steps for the one sender that the settings name."""
 
-    def __init__(self, settings: Settings, messages: tuple[str, ...]) -> None:
-        """Judge the sender that `settings` name."""
-        if messages:
-            raise click.UsageError("--message does not go with --sender")
-        self._settings = settings
+    option = "--sender"
 
-    def show(
-        self, paths: tuple[str, ...], form: str, context: Context, *, every_field: bool
-    ) -> int:
-        """Write the verdicts for each file; return the exit code."""
-        from mavframecheck.cli.files import Files
-        from mavframecheck.report.integration import render_json, render_text
-
-        if every_field:
-            raise click.UsageError("--all does not go with --sender")
-        files = Files(paths, self._read)
-        render = render_json if form == "json" else render_text
-        echo(render(files.results(), context))
-        return files.exit_code()
-
-    def _read(
-        self, path: str, advance: Callable[[int], None] | None
-    ) -> tuple[FileIntegration, int]:
+    def read(self, path: str, advance: Advance) -> FileIntegration:
+        """Return the verdicts of one recording."""
         from mavframecheck.engine import load_pack
         from mavframecheck.engine.integration import integration_of_file
 
-        found = integration_of_file(path, load_pack(()), self._settings, advance)
-        return found, found.messages
+        return integration_of_file(path, load_pack(()), self.settings, advance)
+
+    def page(self, context: Context) -> FilePage[FileIntegration]:
+        """Return the page of verdicts."""
+        from mavframecheck.report.integration import StepPage
+
+        return StepPage(context)

@@ -141,6 +141,7 @@ def choose(
     baseline: Path | None = None,
     update_baseline: bool = False,
     input_kind: str | None = None,
+    plan: str | None = None,
     **options: Any,
 ) -> Chosen:
     """Return what holds; a mistake in the file or on the command line is a usage error."""
@@ -165,6 +166,7 @@ def choose(
         ignore=config.ignore,
         preview=config.preview,
         autopilot=config.autopilot,
+        plan=plan,
         input_kind=input_kind,
         overrides=config.params,
         dialect=config.dialect or DEFAULT_DIALECT,

@@ -33,10 +33,8 @@ def clocks_of_file(path: str, settings: Settings, progress: Progress | None = No
     dialect = load_dialect(settings.dialect)
     with open_recording(path, settings.input_kind) as recording:
         reading = Reading(recording, settings, dialect)
-        for batch in reading.batches(progress):
-            reading.context.update(batch)
+        for _ in reading.understood(progress):
             _ = reading.context.clocks
-            reading.context.settle()
         context = reading.context
         clocks, book = context.timing, context.clocks
         return FileClocks(

@@ -34,10 +34,8 @@ def missions_of_file(
     with open_recording(path, settings.input_kind) as recording:
         reading = Reading(recording, settings, dialect)
         transactions, found = Transactions(), _Kept()
-        for batch in reading.batches(progress):
-            reading.context.update(batch)
+        for batch in reading.understood(progress):
             found.add(transactions.update(batch))
-            reading.context.settle()
         found.add(transactions.finish())
         context = reading.context
         ledger = Ledger(lambda sender: _is_autopilot(context, sender)).enter(found.missions)

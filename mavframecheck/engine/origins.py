@@ -29,9 +29,8 @@ def origins_of_file(path: str, settings: Settings, progress: Progress | None = N
     dialect = load_dialect(settings.dialect)
     with open_recording(path, settings.input_kind) as recording:
         reading = Reading(recording, settings, dialect)
-        for batch in reading.batches(progress):
-            reading.context.update(batch)
-            reading.context.settle()
+        for _ in reading.understood(progress):
+            pass
         registry = reading.context.registry
         vehicles = tuple(_vehicle(registry, system) for system in registry.systems)
         return FileOrigins(**reading.summary(), vehicles=vehicles)

@@ -201,10 +201,8 @@ def positions(
     reading: Reading, wanted: Collection[str] = (), progress: Progress | None = None
 ) -> Iterator[list[Extract]]:
     """Yield the positions of a recording, one list for each batch."""
-    for batch in reading.batches(progress):
-        reading.context.update(batch)
+    for batch in reading.understood(progress):
         yield list(extracts(batch, reading.context, wanted))
-        reading.context.settle()
 
 
 def _has(layout: Layout, place: Place) -> bool:

@@ -72,6 +72,13 @@ class Reading:
                 progress(int(batch.frames.offset[-1]))
         self._list(self._ranges.close())
 
+    def understood(self, progress: Progress | None = None) -> Iterator[Batch]:
+        """Yield the batches, each while the context knows what it says."""
+        for batch in self.batches(progress):
+            self.context.update(batch)
+            yield batch
+            self.context.settle()
+
     def _count(self, batch: Batch) -> None:
         """Count the frames and the damage of a batch."""
         frames = batch.frames

@@ -42,10 +42,8 @@ def survey_file(
     survey = Survey(messages)
     with open_recording(path, settings.input_kind) as recording:
         reading = Reading(recording, settings, dialect)
-        for batch in reading.batches(progress):
-            reading.context.update(batch)
+        for batch in reading.understood(progress):
             survey.update(batch, reading.context)
-            reading.context.settle()
         return summary(reading, survey.finish(reading.vehicles()))
 
 

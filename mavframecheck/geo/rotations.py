@@ -45,6 +45,12 @@ def ned_from_frd(roll: npt.ArrayLike, pitch: npt.ArrayLike, yaw: npt.ArrayLike) 
     )
 
 
+def wrapped(angle: npt.ArrayLike) -> Floats:
+    """Return (...) angles, rad, between -pi (included) and pi."""
+    turned: Floats = (np.asarray(angle, float) + np.pi) % (2 * np.pi) - np.pi
+    return turned
+
+
 def is_rotation(matrix: npt.ArrayLike, tolerance: float = 1e-6) -> npt.NDArray[np.bool_]:
     """Return (...) whether (..., 3, 3) matrices are rotations: orthonormal, and no reflection."""
     m = np.asarray(matrix, float)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import groupby
 
 from mavframecheck.model.clocks import ClockExchange, ClockRestart, ClockStream, FileClocks
-from mavframecheck.report import Context, Piece
 from mavframecheck.report.escape import sentence
-from mavframecheck.report.layout import Page
+from mavframecheck.report.layout import FilePage
 from mavframecheck.report.words import extent, plural, utc
 
 _DOMAINS = {
@@ -26,22 +25,7 @@ _FAR = 0.1
 """A rate further than this from 1 is said as a factor: parts in a million are for crystals."""
 
 
-def render_json(files: Iterable[FileClocks], context: Context) -> Iterator[Piece]:
-    """Yield one document, described in `docs/output.md`."""
-    from mavframecheck.report.json import document
-
-    yield document({"version": context.version, "files": tuple(files)})
-
-
-def render_text(files: Iterable[FileClocks], context: Context) -> Iterator[Piece]:
-    """Yield each file as it is read."""
-    page = _Clocks(context)
-    for number, clocks in enumerate(files):
-        lines = [*([""] if number else []), *page.file(clocks)]
-        yield "".join(f"{line}\n" for line in lines)
-
-
-class _Clocks(Page):
+class ClockPage(FilePage[FileClocks]):
     """Writes clock tables for one context."""
 
     def file(self, clocks: FileClocks) -> Iterator[str]:

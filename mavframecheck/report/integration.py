@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from mavframecheck.model.integration import FileIntegration, StepResult, Verdict
-from mavframecheck.report import Context, Piece
 from mavframecheck.report.escape import sentence
-from mavframecheck.report.layout import Page
+from mavframecheck.report.layout import FilePage
 from mavframecheck.report.words import extent, shortened
 
 _WORDS: dict[Verdict, str] = {
@@ -21,22 +20,7 @@ _WIDTH = 12
 MOST_OTHERS = 12
 
 
-def render_json(files: Iterable[FileIntegration], context: Context) -> Iterator[Piece]:
-    """Yield one document, described in `docs/output.md`."""
-    from mavframecheck.report.json import document
-
-    yield document({"version": context.version, "files": tuple(files)})
-
-
-def render_text(files: Iterable[FileIntegration], context: Context) -> Iterator[Piece]:
-    """Yield each file as it is read."""
-    page = _Steps(context)
-    for number, each in enumerate(files):
-        lines = [*([""] if number else []), *page.file(each)]
-        yield "".join(f"{line}\n" for line in lines)
-
-
-class _Steps(Page):
+class StepPage(FilePage[FileIntegration]):
     """Writes verdicts for one context."""
 
     def file(self, found: FileIntegration) -> Iterator[str]:

@@ -24,6 +24,11 @@ def render(results: Iterable[Checked], context: Context) -> Iterator[bytes]:
     yield document(report)
 
 
+def listing(files: Iterable[object], context: Context) -> Iterator[bytes]:
+    """Yield what was found in each file, as one document, when the last one is read."""
+    yield document({"version": context.version, "files": tuple(files)})
+
+
 def document(value: object) -> bytes:
     """Return `value` as an indented JSON document with a line end."""
     return json_text(msgspec.json.format(msgspec.json.encode(plain(value)), indent=2)) + b"\n"

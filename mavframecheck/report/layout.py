@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
+from typing import Generic, TypeVar
 
 import click
 
@@ -12,6 +14,9 @@ from mavframecheck.report import Context
 from mavframecheck.report.escape import sentence
 
 SEVERITY_COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.INFO: "cyan"}
+
+
+Found = TypeVar("Found")
 
 
 class Page:
@@ -62,3 +67,17 @@ class Page:
     def paint(self, text: str, colour: str) -> str:
         """Return `text` in bold `colour` where colours are shown."""
         return click.style(text, fg=colour, bold=True) if self.context.colour else text
+
+
+class FilePage(Page, ABC, Generic[Found]):
+    """Shows what was found in recordings, one below the other."""
+
+    @abstractmethod
+    def file(self, found: Found) -> Iterator[str]:
+        """Yield the lines about one recording."""
+
+    def render(self, files: Iterable[Found]) -> Iterator[str]:
+        """Yield each recording as it is read."""
+        for number, found in enumerate(files):
+            lines = [*([""] if number else []), *self.file(found)]
+            yield "".join(f"{line}\n" for line in lines)

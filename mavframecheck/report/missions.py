@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from mavframecheck.model.missions import FileMissions, HeldMission, ItemEntry, Transfer
-from mavframecheck.report import Context, Piece
 from mavframecheck.report.escape import sentence
-from mavframecheck.report.layout import Page
+from mavframecheck.report.layout import FilePage
 from mavframecheck.report.words import plural
 
 Row = tuple[str, ...]
@@ -22,22 +21,7 @@ _PX4, _ARDUPILOT, _GENERIC = 12, 3, 0
 _SPEEDS = {"cruiseSpeed": 15, "hoverSpeed": 5}
 
 
-def render_json(files: Iterable[FileMissions], context: Context) -> Iterator[Piece]:
-    """Yield one document, described in `docs/output.md`."""
-    from mavframecheck.report.json import document
-
-    yield document({"version": context.version, "files": tuple(files)})
-
-
-def render_text(files: Iterable[FileMissions], context: Context) -> Iterator[Piece]:
-    """Yield each file as it is read."""
-    page = _Missions(context)
-    for number, each in enumerate(files):
-        lines = [*([""] if number else []), *page.file(each)]
-        yield "".join(f"{line}\n" for line in lines)
-
-
-class _Missions(Page):
+class MissionPage(FilePage[FileMissions]):
     """Writes the missions of recordings for one context."""
 
     def file(self, found: FileMissions) -> Iterator[str]:

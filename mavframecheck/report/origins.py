@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from mavframecheck.model.origins import FileOrigins, Fix, HomeEntry, OriginEntry, VehicleOrigins
-from mavframecheck.report import Context, Piece
 from mavframecheck.report.escape import sentence
-from mavframecheck.report.layout import Page
+from mavframecheck.report.layout import FilePage
 from mavframecheck.report.words import plural
 
 Row = tuple[str, ...]
@@ -15,22 +14,7 @@ _PLACE = ("time", "latitude", "longitude", "height")
 _UNSAID = "not said: inferred from local and global positions"
 
 
-def render_json(files: Iterable[FileOrigins], context: Context) -> Iterator[Piece]:
-    """Yield one document, described in `docs/output.md`."""
-    from mavframecheck.report.json import document
-
-    yield document({"version": context.version, "files": tuple(files)})
-
-
-def render_text(files: Iterable[FileOrigins], context: Context) -> Iterator[Piece]:
-    """Yield each file as it is read."""
-    page = _Registry(context)
-    for number, each in enumerate(files):
-        lines = [*([""] if number else []), *page.file(each)]
-        yield "".join(f"{line}\n" for line in lines)
-
-
-class _Registry(Page):
+class OriginPage(FilePage[FileOrigins]):
     """Writes registries for one context."""
 
     def file(self, found: FileOrigins) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from mavframecheck.model.survey import (
     FieldSurvey,
@@ -12,10 +12,10 @@ from mavframecheck.model.survey import (
     ValueCount,
     ViewSurvey,
 )
-from mavframecheck.report import Context, Piece
+from mavframecheck.report import Context
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.fields import is_spatial, meaning, refers_to, share, values
-from mavframecheck.report.layout import Page
+from mavframecheck.report.layout import FilePage
 from mavframecheck.report.words import component, plural, what_was_read
 from mavframecheck.semantics.references import Reference
 
@@ -25,24 +25,7 @@ _WIDEST_NAME, _WIDEST_MEANING = 24, 20
 _LEGEND_COLUMN = 24
 
 
-def render_json(surveys: Iterable[FileSurvey], context: Context) -> Iterator[Piece]:
-    """Yield one document, described in `docs/output.md`."""
-    from mavframecheck.report.json import document
-
-    yield document({"version": context.version, "files": tuple(surveys)})
-
-
-def render_text(
-    surveys: Iterable[FileSurvey], context: Context, *, every_field: bool
-) -> Iterator[Piece]:
-    """Yield each file as it is read; `every_field`: also those that say nothing of place or time."""
-    page = _Map(context, every_field=every_field)
-    for number, survey in enumerate(surveys):
-        lines = [*([""] if number else []), *page.file(survey)]
-        yield "".join(f"{line}\n" for line in lines)
-
-
-class _Map(Page):
+class MapPage(FilePage[FileSurvey]):
     """Writes maps for one context."""
 
     def __init__(self, context: Context, *, every_field: bool) -> None:

@@ -184,6 +184,12 @@ class TrackKey(NamedTuple):
     """Values of the source's variant fields."""
 
 
+def first_in_each(bins: Ints, last: int) -> Ints:
+    """Return the rows that come into a later bin than any before, of (n,) `bins` that go on from `last`."""
+    highest = np.maximum.accumulate(np.maximum(bins, last))
+    return np.flatnonzero(np.diff(highest, prepend=last) > 0)
+
+
 @dataclass(slots=True)
 class Track:
     """The samples of one stream."""
@@ -203,8 +209,7 @@ class Track:
         """Take in further rows, in the `bins` they fall into."""
         self.rows += len(table)
         self.last = seen(table.frames, -1)
-        fresh = np.flatnonzero(np.diff(np.maximum.accumulate(bins), prepend=self.last_bin) > 0)
-        fresh = fresh[bins[fresh] > self.last_bin]
+        fresh = first_in_each(bins, self.last_bin)
         if not len(fresh):
             return
         self.last_bin = int(bins[fresh[-1]])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.motion.series import Series
+from mavframecheck.checks.motion.series import Series, thinned
 from mavframecheck.geo import quaternions as q4
 
 Floats = npt.NDArray[np.float64]
@@ -141,8 +141,7 @@ def compare(
 
     It may come so many seconds later than the reference as `delays` (k,) say, and may be off by `fits` rad.
     """
-    at = stream.t[stream.t >= since_s]
-    at = at[np.diff(np.floor(at / GRID_S), prepend=-np.inf) > 0]
+    at = thinned(stream.t[stream.t >= since_s], GRID_S)
     best: tuple[float, float, list[_Read]] | None = None
     for delay in delays.tolist():
         mine, theirs = stream.attitudes(at), reference.attitudes(at - delay)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.motion.series import Series
+from mavframecheck.checks.motion.series import Series, thinned
 from mavframecheck.geo import permutations
 from mavframecheck.geo.alignment import (
     Linear,
@@ -188,8 +188,7 @@ def _steps(stream: Series, reference: Series, span_s: float) -> _Steps | Undecid
 def grid(t: Floats) -> tuple[Floats, float]:
     """Return the times of samples, thinned evenly, and how far apart they are at the least, s."""
     grid_s = max(GRID_S, len(t) * SAMPLE_S / MAX_TIMES)
-    places = np.floor(t / grid_s)
-    return t[np.diff(places, prepend=-np.inf) > 0], grid_s
+    return thinned(t, grid_s), grid_s
 
 
 def _moving(moved: Floats, went: Floats) -> tuple[Bools, tuple[Floats, Floats], Bools]:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.checks.motion import attitude, axes, twist
-from mavframecheck.checks.motion.series import APART_M, Series
+from mavframecheck.checks.motion.series import APART_M, Series, thinned
 from mavframecheck.geo import quaternions as q4
 from mavframecheck.model.trace import Figure, Trace
 from mavframecheck.vehicle.flight import line
@@ -48,7 +48,7 @@ def of_axes(
 
 def of_attitude(lie: attitude.Lie, stream: Series, truth: Series, t0_s: float) -> Iterator[Figure]:
     """Yield how far the attitude is off, as labelled and as it is to be read, and the angle that is off most."""
-    t = stream.t[np.diff(np.floor(stream.t / attitude.GRID_S), prepend=-np.inf) > 0]
+    t = thinned(stream.t, attitude.GRID_S)
     mine, theirs = stream.attitudes(t), truth.attitudes(t - lie.delay_s)
     both = np.isfinite(mine).all(axis=1) & np.isfinite(theirs).all(axis=1)
     t, mine, theirs = t[both] + t0_s, mine[both], theirs[both]

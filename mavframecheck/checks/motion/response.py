@@ -14,6 +14,7 @@ from mavframecheck.checks.motion.holds import FIELDS, Hold
 from mavframecheck.checks.motion.series import APART_M, Series
 from mavframecheck.geo import quaternions as q4
 from mavframecheck.geo.alignment import yaw_matrix
+from mavframecheck.geo.rotations import wrapped
 from mavframecheck.semantics.constants import constant
 
 Floats = npt.NDArray[np.float64]
@@ -206,11 +207,11 @@ def of_yaw(found: list[Sample]) -> Answer | str:
     """Say how the yaw of setpoints was taken."""
     asked = np.array([each.asked[0] for each in found])
     done = np.array([each.done[0] for each in found])
-    if len(found) < MIN_SAMPLES or np.ptp(np.unwrap(np.sort(_wrapped(asked)))) < MIN_SPREAD:
+    if len(found) < MIN_SAMPLES or np.ptp(np.unwrap(np.sort(wrapped(asked)))) < MIN_SPREAD:
         return (
             f"fewer than {MIN_SAMPLES} yaws, {np.degrees(MIN_SPREAD):.0f} degrees apart, were held"
         )
-    labelled = float(np.median(np.abs(_wrapped(done - asked))))
+    labelled = float(np.median(np.abs(wrapped(done - asked))))
     if labelled < WRONG:
         return Answer("agrees", "", labelled, labelled, 0.0, len(found))
     for kind, off in (
@@ -219,7 +220,7 @@ def of_yaw(found: list[Sample]) -> Answer | str:
         ("sign and offset", done + asked),
     ):
         turn = 0.0 if kind == "sign" else float(np.angle(np.exp(1j * off).mean()))
-        left = float(np.abs(_wrapped(off - turn)).max())
+        left = float(np.abs(wrapped(off - turn)).max())
         if left < RIGHT:
             return Answer(kind, "", left, labelled, turn, len(found))
     return Answer("undecided", "", labelled, labelled, 0.0, len(found))
@@ -236,8 +237,3 @@ def of_yaw_rate(found: list[Sample]) -> Answer | str:
     left, labelled = (float(np.abs(share - each).max()) for each in (-1.0, 1.0))
     kind = "sign" if left < 0.3 else "agrees" if labelled < 0.3 else "undecided"
     return Answer(kind, "", min(left, labelled), labelled, 0.0, int(np.count_nonzero(told)))
-
-
-def _wrapped(angle: Floats) -> Floats:
-    turned: Floats = np.angle(np.exp(1j * angle))
-    return turned

@@ -99,6 +99,12 @@ class Series:
         return Series(self.message, t, went, self.attitude[given], v, self.stamp[given])
 
 
+def thinned(t: Floats, grid_s: float) -> Floats:
+    """Return of ascending times (n,) s the first in each stretch of `grid_s`."""
+    first: Floats = t[np.diff(np.floor(t / grid_s), prepend=-np.inf) > 0]
+    return first
+
+
 def _places_in(t: Floats, at: Floats) -> tuple[npt.NDArray[np.int64], Floats, Bools]:
     """Return (k,) the sample before each time, the share of the way to the next, and whether that is near."""
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.motion.series import Series
+from mavframecheck.checks.motion.series import Series, thinned
 from mavframecheck.geo import quaternions as q4
 from mavframecheck.geo.alignment import trimmed_rms, yaw_matrix
 
@@ -96,7 +96,7 @@ def readings(
     stream: Series, place: Series, attitude: Series, *, yaw: float, delay_s: float, rate: float
 ) -> Readings:
     """Return the velocity of `stream` as it may be meant, at moments at which the vehicle moves."""
-    at = stream.t[np.diff(np.floor(stream.t / GRID_S), prepend=-np.inf) > 0]
+    at = thinned(stream.t, GRID_S)
     true = place.steps(at - delay_s, SPAN_S) / (SPAN_S * rate)
     given = _smoothed(stream, at)
     lies = attitude.attitudes(at - delay_s)
