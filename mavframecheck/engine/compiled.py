@@ -256,6 +256,7 @@ class Binding:
         return name, None
 
 
+@functools.lru_cache(maxsize=4096)
 def bind(rule: CompiledRule, message: str) -> tuple[Binding, ...]:
     """Return how `rule` judges `message`: one binding per matching tag, one for a message rule, or none."""
     applies = rule.rule.applies

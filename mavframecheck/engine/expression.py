@@ -187,7 +187,7 @@ class Expression:
         def evaluate(scope: Scope) -> Any:
             result = parts[0](scope)
             for part in parts[1:]:
-                if np.all(result) if not conjunction else not np.any(result):
+                if not np.asarray(result).any() if conjunction else np.asarray(result).all():
                     break
                 result = operator(result, part(scope))
             return result

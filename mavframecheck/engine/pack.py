@@ -97,7 +97,7 @@ _ready: tuple[Pack, Settings, list[CompiledRule]] | None = None
 def chosen_rules(pack: Pack, settings: Settings) -> list[CompiledRule]:
     """Return the rules of `pack` that `settings` let run; asked again for the same two, the same ones."""
     global _ready  # noqa: PLW0603  (neither of the two can be hashed)
-    if _ready is None or _ready[0] is not pack or _ready[1] is not settings:
+    if _ready is None or _ready[0] is not pack or _ready[1] != settings:
         _ready = pack, settings, _chosen(pack, settings)
     return _ready[2]
 

@@ -15,6 +15,12 @@ IDENTITY: Floats = np.array([1.0, 0, 0, 0])
 _SHORTEST = 1e-12
 
 
+def _elements(q: npt.ArrayLike) -> tuple[Floats, ...]:
+    """Return w, x, y and z, each (...)."""
+    given = np.asarray(q, float)
+    return tuple(given[..., k] for k in range(4))
+
+
 def unit(q: npt.ArrayLike) -> Floats:
     """Return (..., 4) quaternions of length 1; NaN where there is nothing to scale."""
     given = np.asarray(q, float)
@@ -26,8 +32,8 @@ def unit(q: npt.ArrayLike) -> Floats:
 
 def product(c_from_b: npt.ArrayLike, b_from_a: npt.ArrayLike) -> Floats:
     """Return (..., 4) `c_from_a`: first the right one turns, then the left one."""
-    w1, x1, y1, z1 = np.moveaxis(np.asarray(c_from_b, float), -1, 0)
-    w2, x2, y2, z2 = np.moveaxis(np.asarray(b_from_a, float), -1, 0)
+    w1, x1, y1, z1 = _elements(c_from_b)
+    w2, x2, y2, z2 = _elements(b_from_a)
     return np.stack(
         [
             w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
@@ -66,7 +72,7 @@ def quaternion_from_euler(roll: npt.ArrayLike, pitch: npt.ArrayLike, yaw: npt.Ar
 
 def euler_from_quaternion(ned_from_frd: npt.ArrayLike) -> Floats:
     """Return (..., 3) roll, pitch and yaw, rad, of unit quaternions; at pitch +-90 only yaw - roll is told."""
-    w, x, y, z = np.moveaxis(np.asarray(ned_from_frd, float), -1, 0)
+    w, x, y, z = _elements(ned_from_frd)
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1, 1))
     yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
@@ -75,7 +81,7 @@ def euler_from_quaternion(ned_from_frd: npt.ArrayLike) -> Floats:
 
 def matrix_from_quaternion(target_from_source: npt.ArrayLike) -> Floats:
     """Return (..., 3, 3) the same rotation as a matrix."""
-    w, x, y, z = np.moveaxis(np.asarray(target_from_source, float), -1, 0)
+    w, x, y, z = _elements(target_from_source)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
@@ -117,7 +123,7 @@ def turn_by(target_from_source: npt.ArrayLike, vectors: npt.ArrayLike) -> Floats
 
 def angle_between(a: npt.ArrayLike, b: npt.ArrayLike) -> Floats:
     """Return (...) the angle, rad in 0..pi, by which two attitudes differ."""
-    w, *xyz = np.moveaxis(product(inverse(a), b), -1, 0)
+    w, *xyz = _elements(product(inverse(a), b))
     angle: Floats = 2 * np.arctan2(np.sqrt(sum(np.square(each) for each in xyz)), np.abs(w))
     return angle
 

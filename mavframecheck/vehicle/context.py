@@ -68,6 +68,8 @@ class _Meaning:
     def __init__(self, table: Table, roles: RoleBook) -> None:
         self.table = table
         self._roles = roles
+        self.answers: dict[tuple[object, ...], Answer] = {}
+        """Where histories hold what the rows ask for: the same place for all that one message says."""
 
     @functools.cached_property
     def role(self) -> Ints:
@@ -208,9 +210,7 @@ class Context:
         asked = of.asked_for_command if entry.key == "command" else of.asked
         if not late:
             asked = asked._replace(key=np.where(asked.since > asked.number, -1, asked.key))
-        answers = [
-            (self._ready(h), q, self._answer(entry, h, asked, late=late)) for h, q in entry.sources
-        ]
+        answers = [(self._ready(h), q, self._place(of, entry, h, asked, late)) for h, q in entry.sources]
         history, quantity, answer = answers[0]
         if len(answers) == 1 or (answer.found & (history.numbers(answer) < asked.since)).all():
             return self._column(name, entry, history.values(quantity, answer), answer.found)
@@ -227,6 +227,14 @@ class Context:
             places = np.where(known, places, words.setdefault(self._assumed, len(words)))
             known = np.ones(len(known), np.bool_)
         return Known(places, known, tuple(words))
+
+    def _place(self, of: _Meaning, entry: Name, history: str, asked: Asked, late: bool) -> Answer:
+        """Return where a history holds what the rows ask for, found out once in a batch."""
+        key = (history, entry.key, entry.max_age_us, entry.waits, entry.after, late)
+        answer = of.answers.get(key)
+        if answer is None:
+            answer = of.answers[key] = self._answer(entry, history, asked, late=late)
+        return answer
 
     def _answer(self, entry: Name, history: str, asked: Asked, *, late: bool) -> Answer:
         """Find the value before each row, else the first one soon after it (an answer: only that)."""

@@ -88,8 +88,7 @@ def _is_autopilot(table: Table) -> Bools:
 
 def _banner_version(table: Table) -> Values:
     texts = table["text"].tolist()
-    versions = {text: roles.version_from_banner(text) or np.nan for text in set(texts)}
-    return np.array([versions[text] for text in texts], float)
+    return np.array([roles.version_from_banner(text) or np.nan for text in texts], float)
 
 
 def _flight_sw_version(table: Table) -> Values:

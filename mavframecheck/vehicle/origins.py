@@ -32,6 +32,8 @@ STEP_M = 0.3
 """An origin or home that is said anew, closer to the last one than this, is the same."""
 ASKED_US = 60_000_000
 """A request counts as what moved an origin or home for this long."""
+REPEATED_US = 5_000_000
+"""A request that says the same again is taken in once in each such stretch."""
 LEAP_S = 3.0
 """Which of two positions leapt is told from the pair right before, no longer ago than this."""
 UNIX_US = 10**15
@@ -176,11 +178,12 @@ class Registry:
         """System and frame of each restart: no origin holds until the next one is established."""
         self._vehicles: dict[int, _Vehicle] = {}
         self._news: dict[str, int] = {"origins": 0, "launches": 0}
+        self._asking = _Asking()
 
     def update(self, batch: Batch, tables: Mapping[str, Table]) -> None:
         """Take in a batch, and of it what autopilots say in `tables`."""
         self._news = {name: len(getattr(self, name)) for name in self._news}
-        requests = list(_requests(batch))
+        requests = list(self._asking.requests(batch))
         systems = {int(s) for table in tables.values() for s in np.unique(table.frames.sysid)}
         for system in sorted(systems | ({*self._vehicles} if requests else set())):
             vehicle = self._vehicles.get(system)
@@ -287,10 +290,12 @@ class _Vehicle:
                 self._on_home(event, clock_us)
                 continue
             upto = int(np.searchsorted(pairs["number"], event.seen.number))
-            self._infer(pairs[done:upto])
+            if upto > done:
+                self._infer(pairs[done:upto])
             done, self._clock_us = upto, clock_us
             getattr(self, f"_on_{event.kind}")(event)
-        self._infer(pairs[done:])
+        if len(pairs) > done:
+            self._infer(pairs[done:])
 
     def _own(self, tables: dict[str, Table]) -> dict[str, Table]:
         """Return the rows of one component: the autopilot of the system that was heard first."""
@@ -585,31 +590,50 @@ def _seen_in(pair: Any) -> Seen:
     )
 
 
-def _requests(batch: Batch) -> Iterator[_Event]:
-    """Yield who asks for an origin or a home; such requests are rare."""
-    for message, kind, commands in _REQUESTS:
-        table = batch.tables.get(message)
-        if table is None:
-            continue
-        rows = np.arange(len(table))
-        if commands:
-            rows = np.flatnonzero(np.isin(table["command"], commands))
-        for row in rows.tolist():
-            frames = table.frames
-            sender = int(frames.sysid[row]) * 256 + int(frames.compid[row])
-            target = int(table["target_system"][row])
-            request = Request(kind, target, _asked_for(table, row), sender)
-            yield _Event(_seen(frames, row), "request", request)
+class _Asking:
+    """Who asks for an origin or a home; some say it every second for the whole flight."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, Floats] = {}
+        """Of each message, what the last request said, and when."""
+
+    def requests(self, batch: Batch) -> Iterator[_Event]:
+        """Yield the requests of a batch that say something new, or the same again after some time."""
+        for message, kind, commands in _REQUESTS:
+            table = batch.tables.get(message)
+            if table is not None and commands:
+                table = table.only(np.isin(table["command"], commands))
+            if table is not None and len(table):
+                for row in self._new(table).tolist():
+                    frames, target = table.frames, int(table["target_system"][row])
+                    sender = int(frames.sender[row])
+                    request = Request(kind, target, _asked_for(table, row), sender)
+                    yield _Event(_seen(frames, row), "request", request)
+
+    def _new(self, table: Table) -> Ints:
+        """Return the rows that differ from the one before in who asks whom for what, or come later."""
+        frames, names = table.frames, [name for name, _ in _place_fields(table.name)]
+        names += ["target_system", *(["param1"] if table.name in _PARAMS else [])]
+        said = [table[name].astype(np.float64) for name in names]
+        key = np.column_stack((*said, frames.sender, frames.clock_us // REPEATED_US))
+        last = self._last.get(table.name, np.full(key.shape[1], -np.inf))
+        self._last[table.name] = key[-1]
+        before = np.concatenate((last[np.newaxis], key[:-1]))
+        return np.flatnonzero(((key != before) & ~(np.isnan(key) & np.isnan(before))).any(axis=1))
 
 
 def _asked_for(table: Table, row: int) -> Geodetic | None:
     """Return the position that a request names, None for the current one."""
-    scales = {"SET_GPS_GLOBAL_ORIGIN": _INTS, "SET_HOME_POSITION": _INTS}
-    names = scales.get(table.name) or _PARAMS[table.name]
-    lat, lon, alt = (float(table[name][row]) / scale for name, scale in names)
+    places = _place_fields(table.name)
+    lat, lon, alt = (float(table[name][row]) / scale for name, scale in places)
     given = np.isfinite([lat, lon, alt]).all() and abs(lat) <= 90 and (lat, lon) != (0, 0)
     current = table.name in _PARAMS and table["param1"][row] == 1
     return Geodetic(lat, lon, alt) if given and not current else None
+
+
+def _place_fields(message: str) -> tuple[tuple[str, float], ...]:
+    """Return the fields of a request that name a position, and what they are divided by (deg, m)."""
+    return _PARAMS.get(message, _INTS)
 
 
 _INTS = (("latitude", 1e7), ("longitude", 1e7), ("altitude", 1e3))

@@ -172,6 +172,7 @@ def version_text(number: float | None) -> str | None:
     return f"{major}.{minor}.{patch}"
 
 
+@functools.lru_cache(maxsize=4096)
 def version_from_banner(text: bytes) -> int | None:
     """Return the version in a boot banner (``ArduCopter V4.5.7 (abc)``), None in any other text."""
     match = _VERSION.search(text)

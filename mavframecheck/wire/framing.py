@@ -162,6 +162,13 @@ class _Candidates:
         self.good: Bools = np.zeros(len(at), np.bool_)
         self.checked: Bools = np.zeros(len(at), np.bool_)
 
+    def at(self, position: Ints | int) -> Ints:
+        """Return the candidate that begins at each position, or NO_RECORD."""
+        if not len(self.start):
+            return np.full(np.shape(position), NO_RECORD)
+        place = np.searchsorted(self.start[:-1], position)
+        return np.where(self.start[place] == position, place, NO_RECORD)
+
 
 class _Walk:
     """One pass over one buffer. Positions are indices into it; `done` is how far it is decided."""
@@ -191,7 +198,7 @@ class _Walk:
         breaks = np.flatnonzero(self.successor[chain] != np.append(chain[1:], STOP))
         going = not lost or self._resume(lost)
         while going:
-            i = self._at(self.done + self.gap)
+            i = int(self.candidates.at(self.done + self.gap))
             if i >= 0 and certain[i]:
                 first = int(np.searchsorted(chain, i))
                 last = int(breaks[np.searchsorted(breaks, first)])
@@ -202,9 +209,10 @@ class _Walk:
     def _index_successors(self) -> None:
         """Find, for each candidate, the candidate that begins where its record ends."""
         c = self.candidates
-        self.slot = np.full(self.size + 2 * LONGEST_FRAME, NO_RECORD, np.int32)
-        self.slot[c.start] = np.arange(len(c.start), dtype=np.int32)
-        self.successor = self.slot[c.end + self.gap]
+        self.successor = np.arange(1, len(c.start) + 1)
+        due = c.end + self.gap
+        apart = np.flatnonzero(np.append(c.start, NO_RECORD)[1:] != due)
+        self.successor[apart] = c.at(due[apart])
         self.ends_file: Bools = (c.end == self.size) & self.final
         self.due: Bools = (self.successor >= 0) & ~(c.sure[self.successor] | self.final)
         """Whether the bytes that tell if a record follows are still to come."""
@@ -257,10 +265,6 @@ class _Walk:
         received = self.octets[tail] | self.octets[tail + 1].astype(np.uint16) << 8
         c.good[rows] = crc == received
         c.checked[rows] = True
-
-    def _at(self, position: int) -> int:
-        """Return the candidate that begins at `position`, or NO_RECORD."""
-        return int(self.slot[position]) if position < self.size else NO_RECORD
 
     def _is_good(self, i: int) -> bool:
         c = self.candidates
@@ -332,7 +336,7 @@ class _Walk:
         else:
             stamp = target - self.gap
             self._skip_to(stamp if stamp >= self.done else target, reason)
-        return target is not None and self._accept(np.array([self._at(target)]))
+        return target is not None and self._accept(self.candidates.at(np.array([target])))
 
     def _next_good(self, position: int) -> int | None:
         """Return the start of the first frame from `position` on whose checksum holds."""

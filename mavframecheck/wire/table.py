@@ -18,30 +18,47 @@ Column = npt.NDArray[Any]
 
 
 class Table:
-    """All messages of one id in a batch."""
+    """All messages of one id in a batch.
+
+    A table taken from another one takes over a column only when somebody looks at it.
+    """
 
     def __init__(
-        self, layout: Layout, frames: Frames, rows: Ints, columns: npt.NDArray[np.void]
+        self,
+        layout: Layout,
+        frames: Frames,
+        rows: Ints,
+        payloads: npt.NDArray[np.void],
+        picked: Ints | None = None,
     ) -> None:
-        """Hold `columns` of `layout`, the payloads at `rows` of `frames`."""
+        """Hold the `payloads` of `layout` (those at `picked`), which came with `rows` of `frames`."""
         self.layout = layout
-        self.columns = columns
-        """(n,) structured, payloads zero-extended."""
         self._source = frames
         self._rows = rows
+        self._payloads = payloads
+        self._picked = picked
+        self._taken: dict[str, Column] = {}
 
     @functools.cached_property
     def frames(self) -> Frames:
         """The frames of the rows."""
         return self._source.take(self._rows)
 
+    @functools.cached_property
+    def columns(self) -> npt.NDArray[np.void]:
+        """(n,) structured, payloads zero-extended."""
+        return self._payloads if self._picked is None else self._payloads[self._picked]
+
     def __len__(self) -> int:
         """Return the number of rows."""
-        return len(self.columns)
+        return len(self._rows)
 
     def __getitem__(self, field: str) -> Column:
         """Return the column of `field` as it is on the wire: (n,), or (n, k) for an array."""
-        column: Column = self.columns[field]
+        column = self._taken.get(field)
+        if column is None:
+            whole: Column = self._payloads[field]
+            column = self._taken[field] = whole if self._picked is None else whole[self._picked]
         return column
 
     @property
@@ -63,7 +80,9 @@ class Table:
 
     def take(self, rows: Ints | Bools) -> Table:
         """Return a table of the rows at `rows`."""
-        return Table(self.layout, self._source, self._rows[rows], self.columns[rows])
+        rows = np.flatnonzero(rows) if rows.dtype == np.bool_ else rows
+        picked = rows if self._picked is None else self._picked[rows]
+        return Table(self.layout, self._source, self._rows[rows], self._payloads, picked)
 
     def only(self, holds: Bools) -> Table:
         """Return a table of the rows for which `holds`, (n,): itself where that is all of them."""

@@ -16,6 +16,10 @@ Bools = npt.NDArray[np.bool_]
 
 GRID_S = 0.1
 DELAYS_S: Floats = np.arange(-0.3, 0.81, 0.05)
+"""Delays that are tried, s: every `_COARSE`-th, then all around the best one."""
+_COARSE = 3
+MOMENTS = 300
+"""The delay is sought with about so many moments."""
 TELLING = np.radians(5.0)
 """Moments at which two readings differ by less than this, rad, do not tell between them."""
 MIN_TELLING = 20
@@ -142,21 +146,44 @@ def compare(
     It may come so many seconds later than the reference as `delays` (k,) say, and may be off by `fits` rad.
     """
     at = thinned(stream.t[stream.t >= since_s], GRID_S)
-    best: tuple[float, float, list[_Read]] | None = None
-    for delay in delays.tolist():
-        mine, theirs = stream.attitudes(at), reference.attitudes(at - delay)
-        both = np.isfinite(mine).all(axis=1) & np.isfinite(theirs).all(axis=1)
-        if np.count_nonzero(both) < 2 * MIN_TELLING:
-            continue
-        reads = [
-            _read(each, mine[both], theirs[both], free_heading=free_heading) for each in READINGS
-        ]
-        least = min(read.mean for read in reads)
-        if best is None or least < best[0]:
-            best = least, delay, reads
-    if best is None:
+    every = len(at) // MOMENTS or 1
+    tried: dict[int, float] = {}
+
+    def attempt(places: range) -> int:
+        """Try delays by their place in `delays`; return the one that leaves least so far."""
+        for k in places:
+            if 0 <= k < len(delays) and k not in tried:
+                reads = _reads(stream, reference, at, delays[k], free_heading, every)
+                tried[k] = min((read.mean for read in reads), default=np.inf)
+        return min(tried, key=lambda k: tried[k])
+
+    near = attempt(range(0, len(delays), _COARSE))
+    delay = float(delays[attempt(range(near - _COARSE + 1, near + _COARSE))])
+    reads = _reads(stream, reference, at, delay, free_heading)
+    if not reads:
         return "no attitude of the vehicle at the same time"
-    return _choose(best[2], best[1], (float(at[0]), float(at[-1])), fits)
+    return _choose(reads, delay, (float(at[0]), float(at[-1])), fits)
+
+
+def _reads(
+    stream: Series, reference: Series, at: Floats, delay: float, free_heading: bool, every: int = 1
+) -> list[_Read]:
+    """Return the stream under each reading at `every` so many of the times `at`; none where too few are known."""
+    some = at[::every]
+    mine, theirs = stream.attitudes(some), reference.attitudes(some - delay)
+    both = np.isfinite(mine).all(axis=1) & np.isfinite(theirs).all(axis=1)
+    if np.count_nonzero(both) * every < 2 * MIN_TELLING:
+        return []
+    mine, theirs = mine[both], theirs[both]
+    turned = _turned(theirs)
+    return [_read(each, mine, theirs, turned, free_heading) for each in READINGS]
+
+
+def _turned(attitude: Floats) -> float:
+    """Return how far the yaw of (n, 4) attitudes varies, rad."""
+    heading = np.exp(1j * q4.euler_from_quaternion(attitude)[:, 2])
+    spread = np.abs(np.angle(heading / (heading.mean() or 1.0)))
+    return float(np.percentile(spread, 85)) * 2  # more than the mean leaves out
 
 
 class _Read(NamedTuple):
@@ -202,7 +229,9 @@ def _usual(off: Floats) -> float:
     return float(kept.mean())
 
 
-def _read(reading: Reading, mine: Floats, theirs: Floats, *, free_heading: bool) -> _Read:
+def _read(
+    reading: Reading, mine: Floats, theirs: Floats, turned: float, free_heading: bool
+) -> _Read:
     yaw, mount = 0.0, np.array([1.0, 0, 0, 0])
     free = free_heading or reading.free_yaw
     for _ in range(MOUNT_ROUNDS if free and reading.free_mount else 1):
@@ -215,9 +244,6 @@ def _read(reading: Reading, mine: Floats, theirs: Floats, *, free_heading: bool)
             yaw = float(np.angle(np.exp(1j * turns).sum()))
             yaw += float(np.median(np.angle(np.exp(1j * (turns - yaw)))))
     predicted = q4.product(reading.of(q4.product(q4.about_z(yaw), theirs)), mount)
-    heading = np.exp(1j * q4.euler_from_quaternion(theirs)[:, 2])
-    spread = np.abs(np.angle(heading / (heading.mean() or 1.0)))
-    turned = float(np.percentile(spread, 85)) * 2  # more than the mean leaves out
     off = q4.angle_between(mine, predicted)
     return _Read(reading, off, predicted, float(np.angle(np.exp(1j * yaw))), turned, mount)
 
