@@ -6,6 +6,7 @@ machine; what is quoted should name the machine and the day all the same.
 
 from __future__ import annotations
 
+import compileall
 import statistics
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from pymavlink import mavutil
 from rich.console import Console
 from rich.table import Table
 
+import mavframecheck
 from benchmarks.corpus import FINDINGS_OR_NONE, arguments
 from mavframecheck.sources import open_recording
 from mavframecheck.wire import load_dialect, read_batches
@@ -153,8 +155,8 @@ def peak_bytes(path: Path) -> int:
 
 
 def speeds(path: Path) -> list[Figure]:
-    """Return (a), (b) and (c): messages a second on one log."""
-    count = read_with_pymavlink(path)  # also warms the disk's cache for all of them
+    """Return (a), (b) and (c): messages a second on one log, long enough that starting up does not count."""
+    count = read_columns(path)  # also warms the disk's cache for all of them
     bare = count / best_seconds(read_with_pymavlink, path, 2)
     figures = [Figure("(a) bare pymavlink recv_match loop", f"{bare:12,.0f} messages/s")]
     for what, work, required in (
@@ -169,6 +171,7 @@ def speeds(path: Path) -> list[Figure]:
 
 def start_to_end(path: Path, times: int = 7) -> Figure:
     """Return (d): a whole process on a small log."""
+    compileall.compile_dir(Path(mavframecheck.__file__).parent, quiet=1)  # as `pip install` does
     took = statistics.median(seconds(lambda: run_check(path)) for _ in range(times))
     what = f"(d) check of {path.stat().st_size / MB:.1f} MB, process start to end"
     return Figure(what, f"{took:12.2f} s (median of {times})", "<= 0.5 s", took <= 0.5)
@@ -200,13 +203,15 @@ def main() -> int:
     options = parser.parse_args()
     base = base_recording(options.corpus)
     with tempfile.TemporaryDirectory() as folder:
-        small, middle, large = (Path(folder, f"{name}.tlog") for name in ("1mb", "10mb", "1gb"))
+        names = ("small", "short", "long", "huge")
+        small, short, long, huge = (Path(folder, f"{name}.tlog") for name in names)
         write_start(base, small, MB)
-        write_repeated(base, middle, 10 * MB)
-        figures = [*speeds(middle), start_to_end(small)]
+        write_repeated(base, short, 10 * MB)
+        write_repeated(base, long, 50 * MB)
+        figures = [*speeds(long), start_to_end(small)]
         if not options.quick:
-            write_repeated(base, large, 1024 * MB)
-            figures += memory(middle, large)
+            write_repeated(base, huge, 1024 * MB)
+            figures += memory(short, huge)
     show(figures, base)
     return int(not all(figure.met for figure in figures))
 

@@ -336,7 +336,9 @@ class StampStream:
         new["stamp"], new["last_stamp"] = stamps[starts], stamps[ends]
         new["low_stamp"] = stamps[low]
         new["offset"], new["size"] = frames.offset[starts], frames.size[starts]
-        self.knots = self._joined(np.concatenate((self.knots, new)))
+        kept = max(len(self.knots) - 1, 0)  # only the last one may go on
+        new = self._joined(_following(self.knots[kept:], new))
+        self.knots = _following(self.knots[:kept], new)
 
     def coarsen(self, level: int) -> None:
         """Divide into stretches of ``2 ** level`` frames."""
@@ -358,6 +360,11 @@ class StampStream:
         for name in ("low_t_us", "low_stamp"):
             joined[name] = knots[name][low]
         return joined
+
+
+def _following(one: Knots, other: Knots) -> Knots:
+    """Return knots one after the other: as numbers, since structured arrays are slow to join."""
+    return np.concatenate((one.view(np.int64), other.view(np.int64))).view(KNOT)
 
 
 def _run(frames: Frames, stamps: Ints, rows: tuple[int, int], changed: int) -> _Run:

@@ -210,7 +210,9 @@ class Context:
         asked = of.asked_for_command if entry.key == "command" else of.asked
         if not late:
             asked = asked._replace(key=np.where(asked.since > asked.number, -1, asked.key))
-        answers = [(self._ready(h), q, self._place(of, entry, h, asked, late)) for h, q in entry.sources]
+        answers = [
+            (self._ready(h), q, self._place(of, entry, h, asked, late)) for h, q in entry.sources
+        ]
         history, quantity, answer = answers[0]
         if len(answers) == 1 or (answer.found & (history.numbers(answer) < asked.since)).all():
             return self._column(name, entry, history.values(quantity, answer), answer.found)

@@ -80,9 +80,8 @@ class Table:
 
     def take(self, rows: Ints | Bools) -> Table:
         """Return a table of the rows at `rows`."""
-        rows = np.flatnonzero(rows) if rows.dtype == np.bool_ else rows
-        picked = rows if self._picked is None else self._picked[rows]
-        return Table(self.layout, self._source, self._rows[rows], self._payloads, picked)
+        whole = np.arange(len(self)) if self._picked is None else self._picked
+        return Table(self.layout, self._source, self._rows[rows], self._payloads, whole[rows])
 
     def only(self, holds: Bools) -> Table:
         """Return a table of the rows for which `holds`, (n,): itself where that is all of them."""
