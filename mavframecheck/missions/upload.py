@@ -72,8 +72,7 @@ class Upload:
         tables = {
             name: Table(
                 layout := _wide(dialect.by_name[name]),
-                frames,
-                np.flatnonzero(order == name),
+                frames.take(order == name),
                 _structured(layout, columns),
             )
             for name, columns in rows.items()

@@ -60,7 +60,7 @@ class Frames:
         """Hold `columns` by name."""
         self.__dict__.update(columns)
         self._source: Frames | None = None
-        self._rows: Ints | Bools | None = None
+        self._rows: Ints | Bools | slice = slice(None)
 
     def __getattr__(self, name: str) -> Any:
         """Take a column over from the frames that these were taken from."""
@@ -74,7 +74,7 @@ class Frames:
         """Return the number of frames."""
         return len(self.start)
 
-    def take(self, rows: Ints | Bools) -> Frames:
+    def take(self, rows: Ints | Bools | slice) -> Frames:
         """Return the frames at `rows`."""
         taken = Frames()
         taken._source, taken._rows = self, rows
@@ -82,11 +82,13 @@ class Frames:
 
     def own(self) -> Frames:
         """Return the same frames without holding on to those they were taken from."""
-        return Frames(**{name: getattr(self, name) for name in COLUMNS})
+        return Frames(**{name: getattr(self, name).copy() for name in COLUMNS})
 
     @functools.cached_property
     def sender(self) -> Ints:
         """(n,) system and component as one number: ``sysid * 256 + compid``."""
+        if self._source is not None:
+            return self._source.sender[self._rows]
         sender: Ints = self.sysid.astype(np.int64) * 256 + self.compid
         return sender
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,22 +27,16 @@ class Table:
         self,
         layout: Layout,
         frames: Frames,
-        rows: Ints,
         payloads: npt.NDArray[np.void],
         picked: Ints | None = None,
     ) -> None:
-        """Hold the `payloads` of `layout` (those at `picked`), which came with `rows` of `frames`."""
+        """Hold the `payloads` of `layout` (those at `picked`) and their `frames`."""
         self.layout = layout
-        self._source = frames
-        self._rows = rows
+        self.frames = frames
+        """The frames of the rows."""
         self._payloads = payloads
         self._picked = picked
         self._taken: dict[str, Column] = {}
-
-    @functools.cached_property
-    def frames(self) -> Frames:
-        """The frames of the rows."""
-        return self._source.take(self._rows)
 
     @functools.cached_property
     def columns(self) -> npt.NDArray[np.void]:
@@ -51,7 +45,7 @@ class Table:
 
     def __len__(self) -> int:
         """Return the number of rows."""
-        return len(self._rows)
+        return len(self._payloads if self._picked is None else self._picked)
 
     def __getitem__(self, field: str) -> Column:
         """Return the column of `field` as it is on the wire: (n,), or (n, k) for an array."""
@@ -81,7 +75,7 @@ class Table:
     def take(self, rows: Ints | Bools) -> Table:
         """Return a table of the rows at `rows`."""
         whole = np.arange(len(self)) if self._picked is None else self._picked
-        return Table(self.layout, self._source, self._rows[rows], self._payloads, whole[rows])
+        return Table(self.layout, self.frames.take(rows), self._payloads, whole[rows])
 
     def only(self, holds: Bools) -> Table:
         """Return a table of the rows for which `holds`, (n,): itself where that is all of them."""
@@ -89,7 +83,7 @@ class Table:
 
     def compact(self) -> Table:
         """Return the same rows without holding on to the rest of their batch."""
-        return Table(self.layout, self.frames.own(), np.arange(len(self)), self.columns)
+        return Table(self.layout, self.frames.own(), self.columns)
 
 
 def join(parts: list[Table]) -> Table:
@@ -97,17 +91,7 @@ def join(parts: list[Table]) -> Table:
     if len(parts) == 1:
         return parts[0]
     joined = join_frames([part.frames for part in parts])
-    return Table(
-        parts[0].layout, joined, np.arange(len(joined)), np.concatenate([p.columns for p in parts])
-    )
-
-
-@dataclass(slots=True)
-class _Group:
-    """Rows of a batch that hold one message."""
-
-    layout: Layout
-    rows: Ints
+    return Table(parts[0].layout, joined, np.concatenate([p.columns for p in parts]))
 
 
 class Tables(Mapping[str, Table]):
@@ -122,11 +106,16 @@ class Tables(Mapping[str, Table]):
     ) -> None:
         """Group the good frames of `frames` (those of `only`), whose bytes lie in `buffer`, by message id."""
         self._buffer = buffer
-        self._frames = frames
         good = frames.good if only is None else frames.good & only
+        rows = _by_id(frames.msgid, good)
+        self._frames = frames.take(rows)
+        """Those of one message follow each other, so that each table has a stretch of every column."""
+        ids = frames.msgid[rows]
+        edges = [0, *(np.flatnonzero(np.diff(ids)) + 1).tolist(), len(ids)]
         self._groups = {
-            layouts[msgid].name: _Group(layouts[msgid], rows)
-            for msgid, rows in _by_id(frames, good)
+            layouts[int(ids[first])].name: (layouts[int(ids[first])], slice(first, last))
+            for first, last in itertools.pairwise(edges)
+            if last > first
         }
         self._decoded: dict[str, Table] = {}
 
@@ -134,9 +123,10 @@ class Tables(Mapping[str, Table]):
         """Return the table of the message called `name`; KeyError when the batch has none."""
         table = self._decoded.get(name)
         if table is None:
-            group = self._groups[name]
-            columns = _payloads(self._buffer, self._frames, group)
-            table = self._decoded[name] = Table(group.layout, self._frames, group.rows, columns)
+            layout, rows = self._groups[name]
+            frames = self._frames.take(rows)
+            payloads = _payloads(self._buffer, frames, layout)
+            table = self._decoded[name] = Table(layout, frames, payloads)
         return table
 
     def __iter__(self) -> Iterator[str]:
@@ -148,22 +138,21 @@ class Tables(Mapping[str, Table]):
         return len(self._groups)
 
 
-def _by_id(frames: Frames, good: Bools) -> list[tuple[int, Ints]]:
-    """Return (message id, rows in order) of the `good` frames."""
+def _by_id(ids: npt.NDArray[np.int32], good: Bools) -> Ints:
+    """Return the rows that are `good`, by message id and in order."""
     rows = np.flatnonzero(good)
-    ids = frames.msgid[rows]
+    ids = ids[rows]
     narrow = ids.astype(np.uint16) if not len(ids) or ids.max() < 2**16 else ids
-    order = np.argsort(narrow, kind="stable")
-    groups = np.split(rows[order], np.flatnonzero(np.diff(ids[order])) + 1)
-    return [(int(frames.msgid[group[0]]), group) for group in groups if len(group)]
+    return rows[np.argsort(narrow, kind="stable")]
 
 
-def _payloads(buffer: npt.NDArray[np.uint8], frames: Frames, group: _Group) -> npt.NDArray[np.void]:
-    """Return the payloads of the frames of `group`, zero-extended: (n,) structured."""
-    layout = group.layout
-    start, length = frames.payload[group.rows], frames.length[group.rows]
+def _payloads(
+    buffer: npt.NDArray[np.uint8], frames: Frames, layout: Layout
+) -> npt.NDArray[np.void]:
+    """Return the payloads of `frames`, which hold one message, zero-extended: (n,) structured."""
+    length = frames.length
     windows = np.ndarray(len(buffer) - layout.length + 1, f"V{layout.length}", buffer, strides=(1,))
-    payloads = windows[start]
+    payloads = windows[frames.payload]
     short = np.flatnonzero(length < layout.length)
     if len(short):
         octets = payloads.view(np.uint8).reshape(-1, layout.length)
