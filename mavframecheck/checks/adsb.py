@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.geo.geodesy import bearing_deg, distance_m
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Table
+from mavframecheck.wire import Batch, Dialect, Place, Table
 from mavframecheck.wire.table import join
 
 Floats = npt.NDArray[np.float64]
@@ -102,8 +102,8 @@ class _Traffic(Check):
             sender, Sender(Subject(sender >> 8, sender & 0xFF, MESSAGE, self.field_name))
         )
         state.rows += len(table)
-        state.first = state.first or place(table.frames, 0)
-        state.last = place(table.frames, len(table) - 1)
+        state.first = state.first or table.frames.place(0)
+        state.last = table.frames.place(len(table) - 1)
         before = self._last.get(aircraft)
         joined = table if before is None else join([before, table])
         where = np.column_stack((joined["lat"], joined["lon"]))

@@ -9,19 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Frames
+from mavframecheck.wire import Batch, Dialect, Place
 
 if TYPE_CHECKING:
     from mavframecheck.model.trace import Figure
-
-
-class Place(NamedTuple):
-    """A frame, or damaged range, of the recording."""
-
-    number: int
-    t_us: int | None
-    offset: int
-    size: int
 
 
 class Observation(NamedTuple):
@@ -98,9 +89,3 @@ def load_check(name: str) -> type[Check]:
     if not (isinstance(found, type) and issubclass(found, Check)):
         raise LookupError(f"{name!r} is no check")  # noqa: TRY004  (the name is wrong, not a type)
     return found
-
-
-def place(frames: Frames, row: int) -> Place:
-    """Return where the frame at `row` is."""
-    t_us = int(frames.t_us[row]) if frames.t_valid[row] else None
-    return Place(int(frames.number[row]), t_us, int(frames.offset[row]), int(frames.size[row]))

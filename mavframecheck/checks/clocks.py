@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.enums import Clock
 from mavframecheck.vehicle import Context
-from mavframecheck.vehicle.clocks import MAX_EVENTS, Seen, StepBack, Still
+from mavframecheck.vehicle.clocks import MAX_EVENTS, StepBack, Still
 from mavframecheck.vehicle.timing import STEP_S, Clocks, Pool, Step, Timing, wraps
-from mavframecheck.wire import Batch, Dialect
+from mavframecheck.wire import Batch, Dialect, Place
 
 if TYPE_CHECKING:
     from mavframecheck.model.trace import Figure
@@ -85,17 +85,12 @@ def subject(timing: Timing) -> Subject:
     return Subject(*timing.stream.subject)
 
 
-def place(seen: Seen) -> Place:
-    """Return a frame as the place of a finding."""
-    return Place(*seen)
-
-
 def ends(timing: Timing) -> tuple[Place, Place]:
     """Return the first and the last stamped frame of a stream."""
     first, last = timing.stream.first, timing.stream.last
     if first is None or last is None:
         raise ValueError("a stream without stamps has no timing")
-    return place(first), place(last)
+    return first, last
 
 
 def words(listed: object) -> list[str]:
@@ -132,7 +127,7 @@ class BackwardStamps(ClockCheck):
                     "rows": timing.stream.stamped,
                 }
                 found = far or steps
-                first, last = place(found[0].after), place(found[-1].after)
+                first, last = found[0].after, found[-1].after
                 yield Observation(subject(timing), first, last, times, values)
 
     def _unexcused(self, timing: Timing, each: StepBack) -> bool:
@@ -186,9 +181,7 @@ class ChangingClocks(ClockCheck):
                 "role": self.clocks.role(timing.sender),
             }
             last = changes[-1].after
-            yield Observation(
-                subject(timing), place(first.after), place(last), len(changes), values
-            )
+            yield Observation(subject(timing), first.after, last, len(changes), values)
 
 
 _CHANGES = {
@@ -225,9 +218,7 @@ class FrozenStamps(ClockCheck):
                     else "",
                 }
                 times = sum(each.rows for each in long)
-                yield Observation(
-                    subject(timing), place(long[0].first), place(long[-1].last), times, values
-                )
+                yield Observation(subject(timing), long[0].first, long[-1].last, times, values)
 
     def _long(self, each: Still) -> bool:
         changing = each.changed >= self.params["min_changed_share"] * each.rows
@@ -257,7 +248,7 @@ class Wraps(ClockCheck):
                     "before": over[0].stamp_before,
                     "after": over[0].stamp_after,
                 }
-                first, last = place(over[0].after), place(over[-1].after)
+                first, last = over[0].after, over[-1].after
                 yield Observation(subject(timing), first, last, len(over), values)
 
 
@@ -275,7 +266,7 @@ class Restarts(ClockCheck):
                     "role": self.clocks.role(each.sender),
                 }
                 who = Subject(each.sender >> 8, each.sender & 0xFF)
-                yield Observation(who, place(each.seen), place(each.seen), 1, values)
+                yield Observation(who, each.seen, each.seen, 1, values)
 
 
 def alike(timing: Timing, pool: Pool) -> bool:
@@ -312,7 +303,7 @@ class ReceiveClockSteps(ClockCheck):
                 "direction": "back" if offset_s < 0 else "forward",
                 "streams": len(agree),
             }
-            yield Observation(Subject(), place(step.seen), place(step.seen), 1, values)
+            yield Observation(Subject(), step.seen, step.seen, 1, values)
 
     def _candidates(self) -> list[tuple[Timing, Step]]:
         """Return the steps in which a stamp went on, and receive time went back or leapt."""
@@ -373,7 +364,7 @@ class SharedSystemId(ClockCheck):
                 "streams": len(two),
             }
             who = Subject(sender >> 8, sender & 0xFF)
-            yield Observation(who, place(first.stream.backs[0].after), last, switches, values)
+            yield Observation(who, first.stream.backs[0].after, last, switches, values)
 
     def _apart_s(self, timing: Timing) -> float:
         """Return how far apart the two clocks of a stream are, 0 where there is one."""

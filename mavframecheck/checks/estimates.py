@@ -10,10 +10,10 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Table
+from mavframecheck.wire import Batch, Dialect, Place, Table
 from mavframecheck.wire.table import join
 
 Bools = npt.NDArray[np.bool_]
@@ -57,8 +57,8 @@ class Found:
     def hit(self, table: Table, rows: Ints) -> None:
         """Note hits."""
         if len(rows):
-            self.first = self.first or place(table.frames, int(rows[0]))
-            self.last = place(table.frames, int(rows[-1]))
+            self.first = self.first or table.frames.place(int(rows[0]))
+            self.last = table.frames.place(int(rows[-1]))
             self.hits += len(rows)
 
 
@@ -255,8 +255,8 @@ class Rate(PoseCheck[_Beating]):
         table = table.take(table.frames.t_valid)
         if not len(table):
             return
-        found.first = found.first or place(table.frames, 0)
-        found.last = place(table.frames, len(table) - 1)
+        found.first = found.first or table.frames.place(0)
+        found.last = table.frames.place(len(table) - 1)
         family = str(context.lookup("vehicle.autopilot", table).words[-1])
         found.autopilot = found.autopilot if family == "unknown" else family
         before = [found.last_us] if found.last_us else []

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Table
+from mavframecheck.wire import Batch, Dialect, Place, Table
 
 Floats = npt.NDArray[np.float64]
 
@@ -84,8 +84,8 @@ class Axes(Check):
 
     def _add(self, sensor: _Sensor, table: Table) -> None:
         sensor.rows += len(table)
-        sensor.first = sensor.first or place(table.frames, 0)
-        sensor.last = place(table.frames, len(table) - 1)
+        sensor.first = sensor.first or table.frames.place(0)
+        sensor.last = table.frames.place(len(table) - 1)
         gyro = np.column_stack((table["integrated_xgyro"], table["integrated_ygyro"])).astype(float)
         flow = np.column_stack((table["integrated_x"], table["integrated_y"])).astype(float)
         seconds = table["integration_time_us"] * 1e-6

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.geo import quaternions as q4
 from mavframecheck.geo.rotations import wrapped
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.tracks import first_in_each
-from mavframecheck.wire import Batch, Dialect, Table
+from mavframecheck.wire import Batch, Dialect, Place, Table
 
 Floats = npt.NDArray[np.float64]
 
@@ -124,8 +124,8 @@ class YawFrame(Check):
         heading: Floats,
     ) -> None:
         gimbal.rows += len(rows)
-        gimbal.first = gimbal.first or place(table.frames, int(rows[0]))
-        gimbal.last = place(table.frames, int(rows[-1]))
+        gimbal.first = gimbal.first or table.frames.place(int(rows[0]))
+        gimbal.last = table.frames.place(int(rows[-1]))
         gimbal.add(table.frames.t_us[rows], q4.euler_from_quaternion(q)[:, 2], heading)
 
     def finish(self) -> Iterable[Observation]:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.model import Subject
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Table
+from mavframecheck.wire import Batch, Dialect, Place, Table
 
 Ints = npt.NDArray[np.int64]
 
@@ -80,7 +80,7 @@ class NorthAsZero(Check):
                 stream.before = int(yaw[stop - 1])
 
     def _pause(self, stream: _Stream, table: Table, rows: Ints) -> None:
-        first, last = place(table.frames, int(rows[0])), place(table.frames, int(rows[-1]))
+        first, last = table.frames.place(int(rows[0])), table.frames.place(int(rows[-1]))
         stream.open = (stream.open[0] if stream.open is not None else first, last)
         stream.zeros += len(rows)
 

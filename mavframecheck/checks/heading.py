@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.geo.rotations import wrapped
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.tags import FieldTag
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.rows import Rows
-from mavframecheck.wire import Batch, Dialect
+from mavframecheck.wire import Batch, Dialect, Place
 
 Floats = npt.NDArray[np.float64]
 
@@ -98,7 +98,7 @@ class Scale(Check):
                 subject = Subject(sender >> 8, sender & 0xFF, tag.message, tag.field)
                 self._streams[key] = _Stream(subject)
             if key in self._streams:
-                where = place(frames, int(mine[0])), place(frames, int(mine[-1]))
+                where = frames.place(int(mine[0])), frames.place(int(mine[-1]))
                 self._streams[key].add(said[mine], yaw.values[mine], where)
 
     def finish(self) -> Iterable[Observation]:

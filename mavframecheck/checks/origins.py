@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.missions.items import items_of
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
-from mavframecheck.vehicle.origins import SAID, Geodetic, Home, Move, Origin, Registry
-from mavframecheck.wire import Batch, Dialect, Table
+from mavframecheck.vehicle.established import SAID, Geodetic, Home, Move, Origin
+from mavframecheck.vehicle.origins import Registry
+from mavframecheck.wire import Batch, Dialect, Place, Table
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -68,7 +69,7 @@ class _OfRegistry(Check):
     def _observed(self, move: Move, message: str) -> Observation:
         """Return a move as an observation."""
         north, east, down = move.shift
-        origin, where = move.after, Place(*move.seen)
+        origin, where = move.after, move.seen
         values: dict[str, Scalar] = {
             "north_m": north,
             "east_m": east,
@@ -154,7 +155,7 @@ def _home_moved(moved: list[tuple[Vector, Home]]) -> Observation:
         "asked_by": _sender(home.asked_by),
     }
     subject = Subject(home.system, home.component, "HOME_POSITION", None)
-    first, last = Place(*moved[0][1].seen), Place(*moved[-1][1].seen)
+    first, last = moved[0][1].seen, moved[-1][1].seen
     return Observation(subject, first, last, len(moved), values)
 
 
@@ -281,7 +282,7 @@ class _Targets(Check):
         if not len(due):
             return state, end
         row = first + int(due[0])
-        here, at = place(frames, row), rows.at[row]
+        here, at = frames.place(row), rows.at[row]
         found = None
         if state.vehicle is not None:
             self._checked += 1
@@ -324,7 +325,7 @@ def _repeated(state: _Target, rows: _Rows, first: int, end: int) -> _Target:
     """Count the rows that hold the same target again; another one ends it."""
     other = np.flatnonzero((rows.at[first:end] != state.at).any(axis=1))
     upto = int(other[0]) if len(other) else end - first
-    last = place(rows.table.frames, first + upto - 1) if upto else state.last
+    last = rows.table.frames.place(first + upto - 1) if upto else state.last
     return state._replace(times=state.times + upto, last=last, over=bool(len(other)))
 
 
@@ -392,7 +393,7 @@ class OtherOrigin(_Targets):
                 origin = context.registry.origins[places[row]]
                 clock_us = int(rows.table.frames.clock_us[row])
                 at = _vector(rows.at[row])
-                sent.append(_Sent(at, origin, place(rows.table.frames, row), clock_us))
+                sent.append(_Sent(at, origin, rows.table.frames.place(row), clock_us))
 
     def finish(self) -> Iterable[Observation]:
         """Return the streams whose targets fit another vehicle, and those that are the same for several."""

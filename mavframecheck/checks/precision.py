@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.model import Subject
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.enums import Quantity
 from mavframecheck.semantics.tags import FieldTag
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Frames, Table
+from mavframecheck.wire import Batch, Dialect, Frames, Place, Table
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -258,9 +258,9 @@ def _extend(
 ) -> None:
     """Add the rows from `start` to `stop`, all on the grid, to a run."""
     if run.first is None:
-        run.first = place(frames, start)
+        run.first = frames.place(start)
         run.where = (float(raw[start, 0]) * E7, float(raw[start, 1]) * E7)
-    run.last = place(frames, stop - 1)
+    run.last = frames.place(stop - 1)
     run.times += stop - start
     if len(run.seen) >= MAX_DISTINCT:
         return

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant, entry_name
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Table
+from mavframecheck.wire import Batch, Dialect, Place, Table
 
 Floats = npt.NDArray[np.float64]
 
@@ -81,8 +81,8 @@ class Orientation(Check):
         self, sensor: _Sensor, table: Table, rows: npt.NDArray[np.int64], height: Floats
     ) -> None:
         sensor.rows += len(rows)
-        sensor.first = sensor.first or place(table.frames, int(rows[0]))
-        sensor.last = place(table.frames, int(rows[-1]))
+        sensor.first = sensor.first or table.frames.place(int(rows[0]))
+        sensor.last = table.frames.place(int(rows[-1]))
         sensor.add(height, table["current_distance"][rows] * 1e-2)
 
     def finish(self) -> Iterable[Observation]:

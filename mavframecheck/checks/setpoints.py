@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.geo.rotations import wrapped
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Frames, Table
+from mavframecheck.wire import Batch, Dialect, Frames, Place, Table
 
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
@@ -248,7 +248,7 @@ class FlickeringYaw(SetpointCheck):
         close = _close_together(times, several, self.params["within_s"] * 1e6)
 
         def where(n: int) -> Place:
-            return state.places[n] if n < kept else place(frames, int(switched[n - kept]))
+            return state.places[n] if n < kept else frames.place(int(switched[n - kept]))
 
         new = np.flatnonzero(close & ~counted)
         if len(new):
@@ -328,7 +328,7 @@ class RunawayOffset(SetpointCheck):
                 numbers[first], stream.table["coordinate_frame"][first], at[first]
             )
             frames = stream.table.frames
-            self.report(stream.key, place(frames, first), place(frames, last), len(rows), **values)
+            self.report(stream.key, frames.place(first), frames.place(last), len(rows), **values)
 
     def _continue(
         self, key: tuple[int, int, str], what: Floats, at: Floats, frames: Frames
@@ -344,9 +344,9 @@ class RunawayOffset(SetpointCheck):
                 self._close(key)
                 if wanted[0] < 0:
                     continue
-                begin = place(frames, first)
+                begin = frames.place(first)
                 run = self._runs[key] = _Run(wanted, begin, begin, at[first], at[first])
-            run.last, run.end = place(frames, last), at[last]
+            run.last, run.end = frames.place(last), at[last]
             run.times += last - first + 1
 
     def _close(self, key: tuple[int, int, str]) -> None:
@@ -454,7 +454,7 @@ class ZeroYaw(SetpointCheck):
         away = np.abs(wrapped(yaw)) > np.radians(self.params["min_turn_deg"])
         rows = np.flatnonzero((table["yaw"] == 0) & away & (both | shifted))
         if len(rows):
-            first, last = (place(table.frames, int(rows[k])) for k in (0, -1))
+            first, last = (table.frames.place(int(rows[k])) for k in (0, -1))
             heading = float(np.degrees(yaw[rows[0]]))
             how = "yaw_rate" if both[rows[0]] else "force_bit"
             self.report(stream.key, first, last, len(rows), how=how, yaw_deg=heading, courses="")
@@ -481,7 +481,7 @@ class ZeroYaw(SetpointCheck):
                     legs,
                     float(np.arctan2(de[row], dn[row])),
                     float(yaw[row]),
-                    place(frames, row),
+                    frames.place(row),
                 )
 
     def _leg(

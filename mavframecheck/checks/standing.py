@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Place, Verdict, place
+from mavframecheck.checks.base import Verdict
 from mavframecheck.checks.estimates import Found, PoseCheck, xyz
 from mavframecheck.geo.geodesy import distance_m
 from mavframecheck.model import Scalar
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Table
+from mavframecheck.wire import Place, Table
 
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
@@ -80,7 +80,7 @@ class FrozenPose(PoseCheck[_Standing]):
         self._note(found, table, np.flatnonzero(moved), start, count, away)
         found.pose, found.since = pose[-1], int(count[-1])
         if start[-1] >= 0:
-            found.begun = place(table.frames, int(start[-1]))
+            found.begun = table.frames.place(int(start[-1]))
 
     def counts(self, table: Table) -> Bools:
         """Return (n,) the rows that hold a position."""
@@ -116,7 +116,7 @@ class FrozenPose(PoseCheck[_Standing]):
             return
         if found.first is None:
             began = int(start[hits[0]])
-            found.first = found.begun if began < 0 else place(table.frames, began)
+            found.first = found.begun if began < 0 else table.frames.place(began)
         found.hit(table, hits)
         found.values = {
             **self.words(table, int(hits[0])),

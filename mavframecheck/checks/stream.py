@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.model import Damage, Scalar, Subject
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Dialect, Frames, Ranges
+from mavframecheck.wire import Batch, Dialect, Frames, Place, Ranges
 from mavframecheck.wire.frames import STAMP
 from mavframecheck.wire.framing import CUT_OFF
 
@@ -40,8 +40,8 @@ class _Span:
         found = np.flatnonzero(rows)
         if not len(found):
             return
-        self.first = self.first or place(frames, int(found[0]))
-        self.last = place(frames, int(found[-1]))
+        self.first = self.first or frames.place(int(found[0]))
+        self.last = frames.place(int(found[-1]))
         self.count += len(found)
 
     def observation(
@@ -120,10 +120,10 @@ class StrayBytes(Check):
             self._take(self._ranges.add([damage]))
             if self._ranges.open is damage:
                 row = int(np.searchsorted(frames.offset, damage.offset)) - 1
-                self._opened = place(frames, row) if row >= 0 else self._before
+                self._opened = frames.place(row) if row >= 0 else self._before
         if len(frames):
             self._frames += len(frames)
-            self._before = place(frames, len(frames) - 1)
+            self._before = frames.place(len(frames) - 1)
             self._end = max(self._end, self._before.offset + self._before.size)
 
     def _take(self, ranges: Iterable[Damage]) -> None:

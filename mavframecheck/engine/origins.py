@@ -16,7 +16,8 @@ from mavframecheck.model.origins import (
     VehicleOrigins,
 )
 from mavframecheck.sources import open_recording
-from mavframecheck.vehicle.origins import MSL, Geodetic, Home, Launch, Origin, Registry
+from mavframecheck.vehicle.established import MSL, Geodetic, Home, Launch, Origin
+from mavframecheck.vehicle.origins import Registry
 from mavframecheck.wire import load_dialect
 
 

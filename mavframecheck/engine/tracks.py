@@ -12,8 +12,9 @@ from mavframecheck.engine.positions import Extract, extracts
 from mavframecheck.model.trace import Point, Trace
 from mavframecheck.semantics.positions import GeodeticPosition, LocalPosition
 from mavframecheck.vehicle import Context
+from mavframecheck.vehicle.established import Home, Launch, Origin
 from mavframecheck.vehicle.flight import Key, SeriesBook, line
-from mavframecheck.vehicle.origins import Home, Launch, Origin, Registry
+from mavframecheck.vehicle.origins import Registry
 from mavframecheck.vehicle.pairs import moved
 from mavframecheck.wire import Batch, Frames
 

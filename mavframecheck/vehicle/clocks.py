@@ -19,7 +19,7 @@ import numpy.typing as npt
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.enums import Clock, Quantity
 from mavframecheck.vehicle.timesync import Exchanges
-from mavframecheck.wire import Batch, Frames, Layout, Table
+from mavframecheck.wire import Batch, Frames, Layout, Place, Table
 
 MAX_STREAMS = 512
 """Streams whose stamps are followed, in the order in which they are first heard."""
@@ -72,20 +72,11 @@ class StampKey(NamedTuple):
     instance: int
 
 
-class Seen(NamedTuple):
-    """A frame of the recording."""
-
-    number: int
-    t_us: int | None
-    offset: int
-    size: int
-
-
 class StepBack(NamedTuple):
     """Two neighbours of a stream of which the second has the earlier stamp."""
 
-    before: Seen
-    after: Seen
+    before: Place
+    after: Place
     stamp_before: int
     stamp_after: int
     sent_between: int
@@ -95,8 +86,8 @@ class StepBack(NamedTuple):
 class Still(NamedTuple):
     """A stamp that stayed while the rest of the message changed."""
 
-    first: Seen
-    last: Seen
+    first: Place
+    last: Place
     seconds: float
     """Receive time."""
     rows: int
@@ -133,7 +124,7 @@ def stamp_fields(layout: Layout) -> tuple[StampField, ...]:
 class _Last:
     """The last stamped row of a stream."""
 
-    seen: Seen
+    seen: Place
     stamp: int
     seq: int
     payload: npt.NDArray[np.uint8]
@@ -144,8 +135,8 @@ class _Last:
 class _Run:
     """Rows with one stamp, of which more may come."""
 
-    first: Seen
-    last: Seen
+    first: Place
+    last: Place
     since_us: int
     until_us: int
     stamp: int
@@ -170,8 +161,8 @@ class StampStream:
     """Rows with an earlier stamp than the row before."""
     late: int = 0
     """Of these, rows that were sent before the row before: the way here changed their order."""
-    first: Seen | None = None
-    last: Seen | None = None
+    first: Place | None = None
+    last: Place | None = None
     """First and last stamped row."""
     first_stamp: int = 0
     backs: list[StepBack] = dataclasses.field(default_factory=list)
@@ -213,9 +204,9 @@ class StampStream:
         self._knot(table.frames, stamps, level)
         payload = self._payloads(table, slice(-1, None))[0]
         counter = int(table.frames.seq[-1])
-        self._before = _Last(seen(table.frames, -1), int(stamps[-1]), counter, payload)
+        self._before = _Last(table.frames.place(-1), int(stamps[-1]), counter, payload)
         if self.first is None:
-            self.first, self.first_stamp = seen(table.frames, 0), int(stamps[0])
+            self.first, self.first_stamp = table.frames.place(0), int(stamps[0])
         self.last = self._before.seen
 
     def _compare(self, table: Table, stamps: Ints) -> None:
@@ -253,12 +244,12 @@ class StampStream:
         for row in rows[: MAX_EVENTS - len(kept)].tolist():
             last = self._before
             if row:
-                before = seen(frames, row - 1), int(stamps[row - 1]), int(frames.seq[row - 1])
+                before = frames.place(row - 1), int(stamps[row - 1]), int(frames.seq[row - 1])
             elif last is not None:
                 before = last.seen, last.stamp, last.seq
             where, stamp, counter = before
             sent = (int(frames.seq[row]) - counter) % 256
-            kept.append(StepBack(where, seen(frames, row), stamp, int(stamps[row]), sent))
+            kept.append(StepBack(where, frames.place(row), stamp, int(stamps[row]), sent))
 
     def _stand(self, table: Table, stamps: Ints, same: Bools) -> None:
         """Continue and close runs of rows with one stamp."""
@@ -272,7 +263,7 @@ class StampStream:
         if lead and self._run is not None:
             run = self._run
             run.rows, run.changed = run.rows + lead, run.changed + int(changed[lead - 1])
-            run.last, run.until_us = seen(frames, lead - 1), int(frames.clock_us[lead - 1])
+            run.last, run.until_us = frames.place(lead - 1), int(frames.clock_us[lead - 1])
         if not len(starts):
             return
         self._close()
@@ -371,7 +362,7 @@ def _run(frames: Frames, stamps: Ints, rows: tuple[int, int], changed: int) -> _
     """Return the rows from the first to the last of `rows`, which have one stamp."""
     first, last = rows
     times = int(frames.clock_us[first]), int(frames.clock_us[last])
-    where = seen(frames, first), seen(frames, last)
+    where = frames.place(first), frames.place(last)
     return _Run(*where, *times, int(stamps[first]), last - first + 1, changed)
 
 
@@ -437,12 +428,6 @@ class ClockBook:
         for stream in self.streams.values():
             stream.coarsen(self.level)
         return [self.streams[key] for key in sorted(self.streams)]
-
-
-def seen(frames: Frames, row: int) -> Seen:
-    """Return where the frame at `row` is."""
-    t_us = int(frames.t_us[row]) if frames.t_valid[row] else None
-    return Seen(int(frames.number[row]), t_us, int(frames.offset[row]), int(frames.size[row]))
 
 
 def _first(table: Table) -> int:

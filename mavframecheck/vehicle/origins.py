@@ -8,15 +8,28 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.semantics.constants import constant
+from mavframecheck.vehicle.asking import Asking
 from mavframecheck.vehicle.boots import FALL_MS, BootClock
+from mavframecheck.vehicle.established import (
+    ASKED,
+    INFERRED,
+    MSL,
+    SAID,
+    Event,
+    Geodetic,
+    Home,
+    Launch,
+    Move,
+    Origin,
+    Request,
+)
 from mavframecheck.vehicle.pairs import NEAR_M, PAIR, SHARE, Pairing, Rows, metres
-from mavframecheck.wire import Batch, Frames, Table
+from mavframecheck.wire import Batch, Frames, Place, Table
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -32,136 +45,15 @@ STEP_M = 0.3
 """An origin or home that is said anew, closer to the last one than this, is the same."""
 ASKED_US = 60_000_000
 """A request counts as what moved an origin or home for this long."""
-REPEATED_US = 5_000_000
-"""A request that says the same again is taken in once in each such stretch."""
 LEAP_S = 3.0
 """Which of two positions leapt is told from the pair right before, no longer ago than this."""
 UNIX_US = 10**15
 """Stamps above are no time since boot."""
 ARMED = 128
 """MAV_MODE_FLAG_SAFETY_ARMED."""
-SAID, ASKED, INFERRED = "GPS_GLOBAL_ORIGIN", "SET_GPS_GLOBAL_ORIGIN", "positions"
-MSL = "msl"
 CLOCKS = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "ATTITUDE", "SYSTEM_TIME")
 MESSAGES = (*CLOCKS, "HEARTBEAT", "HOME_POSITION", SAID)
 """What the registry reads of autopilots."""
-
-
-class Seen(NamedTuple):
-    """The frame that said something."""
-
-    number: int
-    t_us: int | None
-    """Receive time, us since 1970; None where it cannot be believed."""
-    offset: int
-    size: int
-
-
-class Geodetic(NamedTuple):
-    """A position on WGS 84."""
-
-    lat: float
-    """deg"""
-    lon: float
-    """deg"""
-    alt_msl: float
-    """m above mean sea level."""
-
-    def shift_to(self, other: Geodetic) -> tuple[float, float, float]:
-        """Return where `other` lies from here, m, NED, as autopilots project."""
-        north, east = metres(*(np.asarray(v) for v in (other.lat, other.lon, self.lat, self.lon)))
-        return float(north), float(east), self.alt_msl - other.alt_msl
-
-
-class Origin(NamedTuple):
-    """A point that local positions of a vehicle are counted from."""
-
-    origin_id: int
-    """Running number among the origins of the vehicle, from 1."""
-    system: int
-    component: int
-    """Of the autopilot."""
-    boot: int
-    """Restarts of the vehicle before it."""
-    at: Geodetic
-    height_reference: str
-    """What the height is above: ``msl``, as MAVLink defines it."""
-    seen: Seen
-    """The frame that established it."""
-    boot_ms: int | None
-    """The vehicle's own clock then, ms since its start."""
-    source: str
-    """GPS_GLOBAL_ORIGIN, SET_GPS_GLOBAL_ORIGIN, or ``positions``: inferred from local and global ones."""
-    asked_by: int | None = None
-    """Sender (``sysid * 256 + compid``) that asked for it."""
-
-
-class Move(NamedTuple):
-    """An origin that replaced another one within a boot."""
-
-    before: Origin
-    after: Origin
-    shift: tuple[float, float, float]
-    """m, NED: where the new one lies from the old one."""
-    seen: Seen
-    """The first frame that shows it."""
-    armed_s: float | None
-    """Time since arming then, s of the recording; None: not armed."""
-    said: bool
-    """Whether a GPS_GLOBAL_ORIGIN says so."""
-    local_m: float | None = None
-    """How far the local position leapt beyond its velocity, m; None where none was seen right before."""
-    global_m: float | None = None
-    """The same of the global position."""
-
-
-class Home(NamedTuple):
-    """The place that a vehicle returns to, and that heights above home are counted from."""
-
-    system: int
-    component: int
-    boot: int
-    at: Geodetic
-    seen: Seen
-    armed_s: float | None
-    """Time since arming then, s of the recording; None: not armed."""
-    asked_by: int | None
-    """Sender (``sysid * 256 + compid``) that asked for it; None: the vehicle itself."""
-
-
-class Launch(NamedTuple):
-    """Where a vehicle was when it was armed."""
-
-    system: int
-    component: int
-    boot: int
-    at: Geodetic | None
-    """None: not known, or armed before the recording began."""
-    seen: Seen
-
-
-class Request(NamedTuple):
-    """Somebody asks for an origin or a home."""
-
-    kind: str
-    """``origin`` or ``home``."""
-    target: int
-    """System that is asked; 0: all."""
-    at: Geodetic | None
-    """None: the current position."""
-    sender: int
-    """``sysid * 256 + compid``."""
-    clock_us: int = 0
-    """Time of the recording."""
-
-
-class _Event(NamedTuple):
-    """Something, in frame order, that changes what holds."""
-
-    seen: Seen
-    kind: str
-    what: Any
-    boot_ms: int | None = None
 
 
 class Registry:
@@ -174,11 +66,11 @@ class Registry:
         self.moves: list[Move] = []
         self.homes: list[Home] = []
         self.launches: list[Launch] = []
-        self.lost: list[tuple[int, Seen]] = []
+        self.lost: list[tuple[int, Place]] = []
         """System and frame of each restart: no origin holds until the next one is established."""
         self._vehicles: dict[int, _Vehicle] = {}
         self._news: dict[str, int] = {"origins": 0, "launches": 0}
-        self._asking = _Asking()
+        self._asking = Asking()
 
     def update(self, batch: Batch, tables: Mapping[str, Table]) -> None:
         """Take in a batch, and of it what autopilots say in `tables`."""
@@ -224,7 +116,7 @@ class Registry:
             boots = np.where(system == lost, np.searchsorted(since, number, side="left"), boots)
         return boots
 
-    def news(self, subject: str) -> Iterator[tuple[int, Seen, dict[str, float]]]:
+    def news(self, subject: str) -> Iterator[tuple[int, Place, dict[str, float]]]:
         """Yield system, frame and quantities of each ``origin`` or ``launch`` that the batch establishes."""
         if subject == "launch":
             for launch in self.launches[self._news["launches"] :]:
@@ -271,7 +163,7 @@ class _Vehicle:
         """System, component and boot, as entries begin."""
         return self.system, self._compid or 0, self._boot
 
-    def update(self, frames: Frames, tables: dict[str, Table], requests: list[_Event]) -> None:
+    def update(self, frames: Frames, tables: dict[str, Table], requests: list[Event]) -> None:
         """Take in what the vehicle says in a batch, and what others ask of it."""
         own = self._own(tables)
         restarts = self._restarts(own, frames)
@@ -305,7 +197,7 @@ class _Vehicle:
         own = {n: table.only(table.frames.compid == self._compid) for n, table in tables.items()}
         return {name: table for name, table in own.items() if len(table)}
 
-    def _restarts(self, own: dict[str, Table], frames: Frames) -> list[_Event]:
+    def _restarts(self, own: dict[str, Table], frames: Frames) -> list[Event]:
         """Return where the vehicle is known to have been started anew."""
         tables = [own[name] for name in CLOCKS if name in own]
         if not tables:
@@ -315,9 +207,9 @@ class _Vehicle:
         order = np.argsort(number, kind="stable")
         restarts = self._clock.update(number[order], t_ms[order])
         first = int(frames.number[0])
-        return [_Event(_seen(frames, each.certain - first), "restart", each) for each in restarts]
+        return [Event(frames.place(each.certain - first), "restart", each) for each in restarts]
 
-    def _changes(self, table: Table, kind: str, restarts: list[_Event]) -> Iterator[_Event]:
+    def _changes(self, table: Table, kind: str, restarts: list[Event]) -> Iterator[Event]:
         """Yield where a message says another position than before in this boot."""
         at = np.column_stack(
             (table["latitude"] / 1e7, table["longitude"] / 1e7, table["altitude"] / 1e3)
@@ -330,7 +222,7 @@ class _Vehicle:
                 self._said.pop(kind, None)
             yield from self._changed(table, at, rows, kind)
 
-    def _changed(self, table: Table, at: Floats, rows: Ints, kind: str) -> Iterator[_Event]:
+    def _changed(self, table: Table, at: Floats, rows: Ints, kind: str) -> Iterator[Event]:
         while len(rows):
             last = self._said.get(kind)
             far = (
@@ -344,9 +236,9 @@ class _Vehicle:
             said = self._said[kind] = Geodetic(*at[row].tolist())
             stamp = int(table["time_usec"][row])
             boot_ms = stamp // 1000 if 0 < stamp < UNIX_US else None
-            yield _Event(_seen(table.frames, row), kind, said, boot_ms)
+            yield Event(table.frames.place(row), kind, said, boot_ms)
 
-    def _armings(self, beats: Table | None, globe: Table | None) -> Iterator[_Event]:
+    def _armings(self, beats: Table | None, globe: Table | None) -> Iterator[Event]:
         """Yield where the vehicle is armed and disarmed, with the last position before."""
         if beats is not None:
             armed = (beats["base_mode"] & ARMED) != 0
@@ -354,15 +246,15 @@ class _Vehicle:
             held = not armed[0] if self._armed is None else self._armed
             before: Bools = np.concatenate(([held], armed[:-1]))
             for row in np.flatnonzero(armed != before).tolist():
-                seen = _seen(beats.frames, row)
+                seen = beats.frames.place(row)
                 place = None if first and not row else _last_place(globe, seen.number, self._place)
                 clock_us = -1 if first and not row else int(beats.frames.clock_us[row])
-                yield _Event(seen, "arming", (bool(armed[row]), clock_us, place))
+                yield Event(seen, "arming", (bool(armed[row]), clock_us, place))
             self._armed = bool(armed[-1])
         if globe is not None:
             self._place = _last_place(globe, int(globe.frames.number[-1]) + 1, self._place)
 
-    def _on_restart(self, event: _Event) -> None:
+    def _on_restart(self, event: Event) -> None:
         """Start anew; what was said since the clock began anew belongs to the new boot."""
         begun, registry = event.what.begun, self._registry
         self._boot += 1
@@ -379,21 +271,21 @@ class _Vehicle:
         if early is not None and early.seen.number >= begun:
             self._enter(early._replace(origin_id=0, boot=self._boot, seen=event.seen))
 
-    def _on_arming(self, event: _Event) -> None:
+    def _on_arming(self, event: Event) -> None:
         armed, clock_us, place = event.what
         self._armed_us = clock_us if armed else None
         if armed and self._room("launches"):
             launch = Launch(*self._who, place, event.seen)
             self._registry.launches.append(launch)
 
-    def _on_home(self, event: _Event, clock_us: int) -> None:
+    def _on_home(self, event: Event, clock_us: int) -> None:
         """Enter a home; it has no part in which origin holds."""
         if self._room("homes"):
             armed_s, asked = self._armed_s(clock_us), self._asker("home", event.what, clock_us)
             home = Home(*self._who, event.what, event.seen, armed_s, asked)
             self._registry.homes.append(home)
 
-    def _on_request(self, event: _Event) -> None:
+    def _on_request(self, event: Event) -> None:
         """Remember who asks; where no origin is known the one asked for is taken to hold."""
         request: Request = event.what
         self._asked[request.kind] = request._replace(clock_us=self._clock_us)
@@ -401,7 +293,7 @@ class _Vehicle:
             asked = Origin(0, *self._who, request.at, MSL, event.seen, None, ASKED, request.sender)
             self._enter(asked)
 
-    def _on_origin(self, event: _Event) -> None:
+    def _on_origin(self, event: Event) -> None:
         """Enter the origin that a message says: the one in force more exactly, or another one."""
         at, old = event.what, self.origin
         asked = self._asker("origin", at, self._clock_us)
@@ -493,7 +385,7 @@ class _Vehicle:
         self,
         old: Origin,
         new: Origin,
-        seen: Seen,
+        seen: Place,
         armed_s: float | None,
         *,
         said: bool = False,
@@ -578,73 +470,8 @@ def _last_place(globe: Table | None, number: int, before: Geodetic | None) -> Ge
     return Geodetic(float(lat[row] / 1e7), float(lon[row] / 1e7), float(globe["alt"][row] / 1e3))
 
 
-def _seen(frames: Frames, row: int) -> Seen:
-    t_us = int(frames.t_us[row]) if frames.t_valid[row] else None
-    return Seen(int(frames.number[row]), t_us, int(frames.offset[row]), int(frames.size[row]))
-
-
-def _seen_in(pair: Any) -> Seen:
+def _seen_in(pair: Any) -> Place:
     t_us = int(pair["t_us"])
-    return Seen(
+    return Place(
         int(pair["number"]), t_us if t_us >= 0 else None, int(pair["offset"]), int(pair["size"])
     )
-
-
-class _Asking:
-    """Who asks for an origin or a home; some say it every second for the whole flight."""
-
-    def __init__(self) -> None:
-        self._last: dict[str, Floats] = {}
-        """Of each message, what the last request said, and when."""
-
-    def requests(self, batch: Batch) -> Iterator[_Event]:
-        """Yield the requests of a batch that say something new, or the same again after some time."""
-        for message, kind, commands in _REQUESTS:
-            table = batch.tables.get(message)
-            if table is not None and commands:
-                table = table.only(np.isin(table["command"], commands))
-            if table is not None and len(table):
-                for row in self._new(table).tolist():
-                    frames, target = table.frames, int(table["target_system"][row])
-                    sender = int(frames.sender[row])
-                    request = Request(kind, target, _asked_for(table, row), sender)
-                    yield _Event(_seen(frames, row), "request", request)
-
-    def _new(self, table: Table) -> Ints:
-        """Return the rows that differ from the one before in who asks whom for what, or come later."""
-        frames, names = table.frames, [name for name, _ in _place_fields(table.name)]
-        names += ["target_system", *(["param1"] if table.name in _PARAMS else [])]
-        said = [table[name].astype(np.float64) for name in names]
-        key = np.column_stack((*said, frames.sender, frames.clock_us // REPEATED_US))
-        last = self._last.get(table.name, np.full(key.shape[1], -np.inf))
-        self._last[table.name] = key[-1]
-        before = np.concatenate((last[np.newaxis], key[:-1]))
-        return np.flatnonzero(((key != before) & ~(np.isnan(key) & np.isnan(before))).any(axis=1))
-
-
-def _asked_for(table: Table, row: int) -> Geodetic | None:
-    """Return the position that a request names, None for the current one."""
-    places = _place_fields(table.name)
-    lat, lon, alt = (float(table[name][row]) / scale for name, scale in places)
-    given = np.isfinite([lat, lon, alt]).all() and abs(lat) <= 90 and (lat, lon) != (0, 0)
-    current = table.name in _PARAMS and table["param1"][row] == 1
-    return Geodetic(lat, lon, alt) if given and not current else None
-
-
-def _place_fields(message: str) -> tuple[tuple[str, float], ...]:
-    """Return the fields of a request that name a position, and what they are divided by (deg, m)."""
-    return _PARAMS.get(message, _INTS)
-
-
-_INTS = (("latitude", 1e7), ("longitude", 1e7), ("altitude", 1e3))
-_PARAMS = {
-    "COMMAND_INT": (("x", 1e7), ("y", 1e7), ("z", 1.0)),
-    "COMMAND_LONG": (("param5", 1.0), ("param6", 1.0), ("param7", 1.0)),
-}
-_SET_HOME = (constant("MAV_CMD.DO_SET_HOME"),)
-_REQUESTS: tuple[tuple[str, str, tuple[int, ...]], ...] = (
-    (ASKED, "origin", ()),
-    ("SET_HOME_POSITION", "home", ()),
-    ("COMMAND_INT", "home", _SET_HOME),
-    ("COMMAND_LONG", "home", _SET_HOME),
-)

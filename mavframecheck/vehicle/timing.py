@@ -19,10 +19,10 @@ from mavframecheck.semantics.enums import Clock
 from mavframecheck.vehicle.clocks import (
     MAX_KNOTS,
     ClockBook,
-    Seen,
     StampStream,
     StepBack,
 )
+from mavframecheck.wire import Place
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -54,7 +54,7 @@ class Step(NamedTuple):
 
     before: int
     """Number of the last frame before it."""
-    seen: Seen
+    seen: Place
     """The first frame after it."""
     receive_s: float
     """How far receive time went, s."""
@@ -71,7 +71,7 @@ class Restart(NamedTuple):
     """The clock of a component begins again."""
 
     sender: int
-    seen: Seen
+    seen: Place
     uptime_s: float
     """Stamp before, s."""
     since_s: float
@@ -159,10 +159,10 @@ class Timing:
             for k in np.flatnonzero(parted).tolist()
         ]
 
-    def _seen_at(self, place: int) -> Seen:
+    def _seen_at(self, place: int) -> Place:
         """Return the first frame of the stretch that the `place`-th point lies in."""
         knot = self.stream.knots[place // 2]
-        return Seen(*(int(knot[name]) for name in ("number", "t_us", "offset", "size")))
+        return Place(*(int(knot[name]) for name in ("number", "t_us", "offset", "size")))
 
     def lag(self, which: str, rate: float) -> Floats:
         """Return (k,) receive time minus stamp of each knot's ``first``, ``last`` or ``low`` row, s."""

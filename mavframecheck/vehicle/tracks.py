@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.vehicle.clocks import Seen, seen
-from mavframecheck.wire import Batch, Table
+from mavframecheck.wire import Batch, Place, Table
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
@@ -196,8 +195,8 @@ class Track:
 
     key: TrackKey
     source: Source
-    first: Seen
-    last: Seen
+    first: Place
+    last: Place
     rows: int = 0
     parts: list[Floats] = field(default_factory=list)
     kept: list[Ints] = field(default_factory=list)
@@ -208,7 +207,7 @@ class Track:
     def add(self, table: Table, bins: Ints, t_s: Floats) -> None:
         """Take in further rows, in the `bins` they fall into."""
         self.rows += len(table)
-        self.last = seen(table.frames, -1)
+        self.last = table.frames.place(-1)
         fresh = first_in_each(bins, self.last_bin)
         if not len(fresh):
             return
@@ -288,7 +287,7 @@ class Tracks:
         if track is None:
             if len(self.tracks) >= MAX_TRACKS:
                 return
-            at = seen(table.frames, 0)
+            at = table.frames.place(0)
             track = self.tracks[key] = Track(key, SOURCES[key.message], at, at)
         since = table.frames.t_us - (self.t0_us or 0)
         bins = np.maximum(since // BIN_US, 0)

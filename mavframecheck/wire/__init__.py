@@ -11,7 +11,7 @@ from mavframecheck.wire.dialect import (
     Layout,
     load_dialect,
 )
-from mavframecheck.wire.frames import Frames
+from mavframecheck.wire.frames import Frames, Place
 from mavframecheck.wire.table import Column, Table, Tables
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "Field",
     "Frames",
     "Layout",
+    "Place",
     "Ranges",
     "Table",
     "Tables",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,16 @@ LONGEST_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
+
+
+class Place(NamedTuple):
+    """Where a frame, or a damaged range, is in the recording."""
+
+    number: int
+    t_us: int | None
+    """Receive time, us since 1970; None where it cannot be believed."""
+    offset: int
+    size: int
 
 
 class Frames:
@@ -79,6 +89,11 @@ class Frames:
         taken = Frames()
         taken._source, taken._rows = self, rows
         return taken
+
+    def place(self, row: int) -> Place:
+        """Return where the frame at `row` is."""
+        t_us = int(self.t_us[row]) if self.t_valid[row] else None
+        return Place(int(self.number[row]), t_us, int(self.offset[row]), int(self.size[row]))
 
     def own(self) -> Frames:
         """Return the same frames without holding on to those they were taken from."""

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mavframecheck.checks.base import Place
 from mavframecheck.checks.motion import response
 from mavframecheck.checks.motion.holds import Hold
 from mavframecheck.checks.motion.response import Answer, Motion, Sample
@@ -18,6 +17,7 @@ from mavframecheck.engine import Pack
 from mavframecheck.engine.examples import recording
 from mavframecheck.geo import permutations
 from mavframecheck.geo import quaternions as q4
+from mavframecheck.wire import Place
 from tests.checks.motion_bench import flight
 from tests.checks.rule_bench import chopped, pack_of_files, rule_named
 from tests.engine.judged import judge, run_of

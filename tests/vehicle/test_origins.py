@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from mavframecheck.geo.geodesy import distance_m
 from mavframecheck.vehicle import Context
-from mavframecheck.vehicle.origins import ASKED, INFERRED, SAID, Registry
+from mavframecheck.vehicle.established import ASKED, INFERRED, SAID
+from mavframecheck.vehicle.origins import Registry
 from mavframecheck.wire import read_batches
 from tests.strategies import DIALECT, START_US, chunks, cut, frame
 

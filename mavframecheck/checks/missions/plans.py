@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Verdict, place
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.missions import Items, Ledger, Mission, Readback, Transactions
 from mavframecheck.missions.held import ALL_KINDS
 from mavframecheck.model import Scalar, Subject
@@ -265,8 +265,8 @@ class MissionCheck(Check):
         message = self.dialect.layouts[int(frames.msgid[first])].name
         return Observation(
             Subject(int(frames.sysid[first]), int(frames.compid[first]), message, field),
-            place(frames, first),
-            place(frames, last),
+            frames.place(first),
+            frames.place(last),
             len(rows),
             values,
         )

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mavframecheck.checks.base import Place, place
 from mavframecheck.checks.missions.plans import Bools, Floats, Ints, with_place
 from mavframecheck.missions.items import items_of
 from mavframecheck.model import Subject
@@ -15,7 +14,7 @@ from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.mavframe import GLOBAL_FRAMES
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.pairs import moved
-from mavframecheck.wire import Batch, Table
+from mavframecheck.wire import Batch, Place, Table
 
 MAX_ROUTES = 64
 MAX_PLACES = 4000
@@ -75,7 +74,7 @@ class Routes:
             if len(self.routes) >= MAX_ROUTES:
                 return
             subject = Subject(stream >> 16, stream >> 8 & 0xFF, name)
-            begun = place(table.frames, int(rows[0]))
+            begun = table.frames.place(int(rows[0]))
             route = self.routes[name, stream] = Route(subject, stream & 0xFF, begun, begun)
         before = route.parts[-1][-1:] if route.parts else columns[:1] + 1
         told = np.concatenate((before, columns))[:, [LAT, LON, SEQ]]
@@ -86,7 +85,7 @@ class Routes:
         if len(new):
             route.parts.append(columns[new])
             route.kept += len(new)
-            route.last = place(table.frames, int(rows[new[-1]]))
+            route.last = table.frames.place(int(rows[new[-1]]))
 
 
 def _lookup(context: Context, table: Table, *names: str) -> Floats:

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.checks.motion import attitude, axes, twist
 from mavframecheck.checks.motion import judge as judging
 from mavframecheck.checks.motion.setpoints import OrderOfSetpoints
 from mavframecheck.model import Scalar
 from mavframecheck.model import Subject as Whom
 from mavframecheck.vehicle import Context
-from mavframecheck.vehicle.clocks import Seen
 from mavframecheck.vehicle.tracks import Source
 from mavframecheck.wire import Batch, Dialect
 
@@ -63,7 +62,7 @@ class MotionCheck(Check):
             **told,
         }
         whom = self._whom(subject, told)
-        return Observation(whom, _place(track.first), _place(track.last), track.rows, values)
+        return Observation(whom, track.first, track.last, track.rows, values)
 
     def _whom(self, subject: judging.Subject, told: Mapping[str, Scalar]) -> Whom:
         track = subject.track
@@ -107,10 +106,6 @@ def _about(told: Mapping[str, Scalar]) -> str:
 
 def _rotation_field(source: Source) -> str:
     return "yaw" if source.euler else "q"
-
-
-def _place(seen: Seen) -> Place:
-    return Place(*seen)
 
 
 class _Axes(MotionCheck):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.checks.motion import attitude, response
 from mavframecheck.checks.motion.checks import lie_values
 from mavframecheck.checks.motion.holds import Holds
@@ -163,7 +163,7 @@ class AttitudeFrame(Check):
             if isinstance(lie, attitude.Lie) and lie.kind not in NO_FRAMES:
                 key = track.key
                 whom = Whom(key.sender >> 8, key.sender & 0xFF, key.message, "q")
-                first, last = Place(*track.first), Place(*track.last)
+                first, last = track.first, track.last
                 yield Observation(whom, first, last, track.rows, lie_values(lie))
 
     def verdict(self) -> Verdict:

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Place, place
 from mavframecheck.checks.setpoints import GLOBAL, LOCAL, Stream, streams
 from mavframecheck.semantics.names import family, mode_name
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Table
+from mavframecheck.wire import Batch, Place, Table
 
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
@@ -155,8 +154,8 @@ def _holds(stream: Stream, system: int, t0_us: int) -> list[Hold]:
             wanted[start],
             float(t[start]),
             float(t[stop - 1]),
-            place(table.frames, start),
-            place(table.frames, stop - 1),
+            table.frames.place(start),
+            table.frames.place(stop - 1),
             stop - start,
         )
         for start, stop in zip([0, *begins], [*begins, len(t)], strict=True)

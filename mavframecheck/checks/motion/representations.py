@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.checks.motion import attitude, axes
 from mavframecheck.checks.motion.judge import Judge, frames
 from mavframecheck.checks.motion.series import Floats
@@ -75,7 +75,7 @@ class Representations(Check):
                     "left_deg": float(np.degrees(found.left)),
                     "says": found.says,
                 }
-                first, last = Place(*track.first), Place(*track.last)
+                first, last = track.first, track.last
                 yield Observation(whom, first, last, track.rows, values)
 
     def verdict(self) -> Verdict:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Observation, Place, place
+from mavframecheck.checks.base import Observation
 from mavframecheck.geo import quaternions as q4
 from mavframecheck.model import Subject
 from mavframecheck.vehicle import Context
-from mavframecheck.wire import Batch, Table
+from mavframecheck.wire import Batch, Place, Table
 
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
@@ -84,14 +84,14 @@ class OrderOfSetpoints:
         stream.rows += len(rows)
         for start, stop in _runs(wrong):
             if start or not stream.run:
-                stream.run, stream.begun = 0, place(table.frames, int(rows[start]))
+                stream.run, stream.begun = 0, table.frames.place(int(rows[start]))
                 stream.run_left = stream.run_labelled = 0.0
             before, stream.run = stream.run, stream.run + stop - start
             stream.run_left = max(stream.run_left, float(left[start:stop].max()))
             stream.run_labelled = max(stream.run_labelled, float(labelled[start:stop].max()))
             if stream.run >= IN_ROW:
                 stream.first = stream.first or stream.begun
-                stream.last = place(table.frames, int(rows[stop - 1]))
+                stream.last = table.frames.place(int(rows[stop - 1]))
                 stream.hits += stop - start + (before if before < IN_ROW else 0)
                 stream.left = max(stream.left, stream.run_left)
                 stream.labelled = max(stream.labelled, stream.run_labelled)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mavframecheck.checks.base import Check, Observation, Place, Verdict
+from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.checks.motion.judge import Judge
 from mavframecheck.checks.motion.series import Floats, Series
 from mavframecheck.geo import quaternions as q4
@@ -72,7 +72,7 @@ class WindDirection(Check):
                 continue
             key = track.key
             whom = Subject(key.sender >> 8, key.sender & 0xFF, key.message)
-            first, last = Place(*track.first), Place(*track.last)
+            first, last = track.first, track.last
             yield Observation(whom, first, last, track.rows, _values(key.message, windows))
 
     def verdict(self) -> Verdict:
