@@ -19,7 +19,7 @@ IDS = sorted(DIALECT.layouts)
 
 def frames(senders: list[int], ids: list[int]) -> Frames:
     """Return good frames of senders (sysid * 256 + compid) and message ids."""
-    made = TEMPLATE.take(np.zeros(len(senders), np.int64))
+    made = TEMPLATE.take(np.zeros(len(senders), np.int64)).own()
     made.sysid = np.array([sender >> 8 for sender in senders], np.uint8)
     made.compid = np.array([sender & 0xFF for sender in senders], np.uint8)
     made.msgid = np.array(ids, np.int32)
