@@ -64,7 +64,7 @@ def _too_old(rows: Rows, now: Frames, patience_us: int) -> Bools:
 
 def _from_first(stream: Ints, rows: Bools) -> Bools:
     """Return (n,) the given rows, and those that come after one of them in its stream."""
-    _, which = np.unique(stream, return_inverse=True)
-    first = np.full(len(stream), len(stream))
-    np.minimum.at(first, which[rows], np.flatnonzero(rows))
-    return np.asarray(np.arange(len(stream)) >= first[which])
+    held, first = np.unique(stream[rows], return_index=True)
+    since = np.flatnonzero(rows)[first]
+    which = np.searchsorted(held[:-1], stream)
+    return np.asarray((held[which] == stream) & (np.arange(len(stream)) >= since[which]))
