@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib.resources
 from pathlib import Path
 
@@ -135,8 +136,10 @@ class TestChoosing:
 def test_the_files_of_a_run_share_rules_and_nothing_else() -> None:
     """What is compiled for one file finds the same in the next as if it were the first."""
     pack, settings = load_pack(), Settings()
-    assert chosen_rules(pack, settings) is chosen_rules(pack, settings)
-    assert chosen_rules(pack, Settings()) is not chosen_rules(pack, settings)
+    shared = chosen_rules(pack, settings)
+    assert chosen_rules(pack, Settings()) is shared
+    assert chosen_rules(pack, Settings(preview=True)) is not shared
+    assert chosen_rules(copy.copy(pack), settings) is not shared
     names = ("degrees_in_scaled_field", "bad_covariance", "clean_px4", "degrees_in_scaled_field")
     for path in [str(SAMPLES / f"{name}.tlog") for name in names]:
-        assert check_file(path, pack, settings) == check_file(path, load_pack(), Settings())
+        assert check_file(path, pack, settings) == check_file(path, copy.copy(pack), settings)
