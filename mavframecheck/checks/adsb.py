@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from mavframecheck.checks.base import Check, Observation, Verdict
 from mavframecheck.geo.geodesy import bearing_deg, distance_m
+from mavframecheck.geo.rotations import wrapped_deg
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
@@ -216,7 +217,7 @@ class HeadingReversed(_Traffic):
         fast = legs.distance_m > self.params["min_speed_mps"] * legs.seconds
         good = near & fast & (legs.distance_m > self.params["min_leg_m"])
         good &= np.isfinite(legs.heading_deg)
-        off = np.abs((legs.heading_deg - legs.bearing_deg + 180) % 360 - 180)
+        off = np.abs(wrapped_deg(legs.heading_deg - legs.bearing_deg))
         against = np.asarray(off > self.params["against_deg"], np.float64)
         sender.add("against", against, np.ones(len(off)), good)
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.checks.base import Check, Observation, Verdict
-from mavframecheck.geo.rotations import wrapped
+from mavframecheck.geo.rotations import wrapped, wrapped_deg
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
@@ -521,7 +521,7 @@ class ZeroYaw(SetpointCheck):
         here = self._global.at(stream)
         lat, lon = table["lat_int"] * 1e-7, table["lon_int"] * 1e-7
         shrink = np.cos(np.radians(lat))
-        turn = (lon - here["lon"] + 180) % 360 - 180
+        turn = wrapped_deg(lon - here["lon"])
         return (
             lat * DEGREE_M,
             lon * DEGREE_M * shrink,

@@ -51,6 +51,12 @@ def wrapped(angle: npt.ArrayLike) -> Floats:
     return turned
 
 
+def wrapped_deg(angle: npt.ArrayLike) -> Floats:
+    """Return (...) angles, or differences of longitudes, deg, between -180 (included) and 180."""
+    turned: Floats = (np.asarray(angle, float) + 180) % 360 - 180
+    return turned
+
+
 def is_rotation(matrix: npt.ArrayLike, tolerance: float = 1e-6) -> npt.NDArray[np.bool_]:
     """Return (...) whether (..., 3, 3) matrices are rotations: orthonormal, and no reflection."""
     m = np.asarray(matrix, float)

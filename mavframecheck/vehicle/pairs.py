@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.geo.rotations import wrapped_deg
 from mavframecheck.wire import Table
 
 Ints = npt.NDArray[np.int64]
@@ -45,7 +46,7 @@ velocity (m, m/s, NED), global position moved to the same moment (deg, m AMSL), 
 
 def metres(lat: Floats, lon: Floats, lat0: Floats, lon0: Floats) -> tuple[Floats, Floats]:
     """Return (n,) north and east of a position from another, m, as autopilots project: on a sphere, flat."""
-    east = np.radians((lon - lon0 + 180) % 360 - 180) * _cosine((lat + lat0) / 2)
+    east = np.radians(wrapped_deg(lon - lon0)) * _cosine((lat + lat0) / 2)
     return np.radians(lat - lat0) * RADIUS_M, east * RADIUS_M
 
 
@@ -53,7 +54,7 @@ def moved(lat: Floats, lon: Floats, north: Floats, east: Floats) -> tuple[Floats
     """Return (n,) latitude and longitude, deg, after going `north` and `east`, m: undoes `metres`."""
     there = lat + np.degrees(north / RADIUS_M)
     turned = lon + np.degrees(east / (RADIUS_M * _cosine((lat + there) / 2)))
-    return there, (turned + 180) % 360 - 180
+    return there, wrapped_deg(turned)
 
 
 def _cosine(lat: Floats) -> Floats:

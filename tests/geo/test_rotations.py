@@ -16,6 +16,8 @@ from mavframecheck.geo.rotations import (
     ned_from_frd,
     turn,
     turn_covariance,
+    wrapped,
+    wrapped_deg,
 )
 
 Floats = npt.NDArray[np.float64]
@@ -96,3 +98,12 @@ def test_covariance_turns_with_its_vector(matrix: Floats, variances: tuple[float
 
     for axis, variance in zip(matrix.T, variances):
         assert axis @ turned @ axis == pytest.approx(variance)
+
+
+@given(st.floats(-1e4, 1e4))
+def test_wrapped_angles_are_the_same_directions(angle: float) -> None:
+    """A wrapped angle lies within half a turn and differs by whole turns."""
+    for turned, turn_of in ((wrapped(np.radians(angle)), 2 * np.pi), (wrapped_deg(angle), 360.0)):
+        assert -turn_of / 2 <= turned <= turn_of / 2
+        before = np.radians(angle) if turn_of < 360 else angle
+        assert (before - turned) / turn_of == pytest.approx(round((before - turned) / turn_of))

@@ -8,6 +8,7 @@ import numpy as np
 
 from mavframecheck.checks.base import Observation
 from mavframecheck.checks.missions.plans import FENCE, Bools, EachMission, Floats, Ints, Plan, Plans
+from mavframecheck.geo.rotations import wrapped_deg
 from mavframecheck.missions import Items
 from mavframecheck.model import Scalar
 from mavframecheck.semantics.constants import constant
@@ -84,7 +85,7 @@ def _polygons(items: Items) -> Iterator[Ints]:
 
 def _metres(lat: Floats, lon: Floats) -> Floats:
     """Return (n, 2) metres north and east of the first corner, near enough to tell crossings."""
-    east = (lon - lon[0] + 180) % 360 - 180
+    east = wrapped_deg(lon - lon[0])
     return np.stack([lat - lat[0], east * np.cos(np.radians(lat[0]))], axis=1) * 111_195.0
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from mavframecheck.checks.base import Observation
 from mavframecheck.checks.missions.plans import EachMission, Ints, Plan, Plans
 from mavframecheck.geo.geodesy import bearing_deg, distance_m
+from mavframecheck.geo.rotations import wrapped_deg
 from mavframecheck.missions import Items
 from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.mavframe import GLOBAL_FRAMES
@@ -51,5 +52,5 @@ class ZeroYaw(EachMission):
         lat, lon = items.x[placed], items.y[placed]
         way = bearing_deg(lat[:-1], lon[:-1], lat[1:], lon[1:])
         long = distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:]) > self.params["min_leg_m"]
-        off_north = np.abs((way + 180) % 360 - 180) > self.params["min_turn_deg"]
+        off_north = np.abs(wrapped_deg(way)) > self.params["min_turn_deg"]
         return bool((long & off_north).any())

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from mavframecheck.checks.motion import attitude, axes, twist
 from mavframecheck.checks.motion.series import APART_M, Series, thinned
 from mavframecheck.geo import quaternions as q4
+from mavframecheck.geo.rotations import wrapped_deg
 from mavframecheck.model.trace import Figure, Trace
 from mavframecheck.vehicle.flight import line
 
@@ -64,7 +65,7 @@ def of_attitude(lie: attitude.Lie, stream: Series, truth: Series, t0_s: float) -
     )
     yield Figure(title=f"Difference from {truth.message}", kind="time", unit="deg", traces=off)
     said, true, read = (np.degrees(q4.euler_from_quaternion(q)) for q in (mine, theirs, predicted))
-    most = int(np.argmax(np.median(np.abs((said - true + 180) % 360 - 180), axis=0)))
+    most = int(np.argmax(np.median(np.abs(wrapped_deg(said - true)), axis=0)))
     angles = (
         _line(truth.message, "reference", t, true[:, most]),
         _line(stream.message, "claimed", t, said[:, most]),
