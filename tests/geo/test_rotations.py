@@ -103,7 +103,10 @@ def test_covariance_turns_with_its_vector(matrix: Floats, variances: tuple[float
 @given(st.floats(-1e4, 1e4))
 def test_wrapped_angles_are_the_same_directions(angle: float) -> None:
     """A wrapped angle lies within half a turn and differs by whole turns."""
-    for turned, turn_of in ((wrapped(np.radians(angle)), 2 * np.pi), (wrapped_deg(angle), 360.0)):
-        assert -turn_of / 2 <= turned <= turn_of / 2
-        before = np.radians(angle) if turn_of < 360 else angle
-        assert (before - turned) / turn_of == pytest.approx(round((before - turned) / turn_of))
+    for before, after, whole in (
+        (np.radians(angle), wrapped(np.radians(angle)), 2 * np.pi),
+        (angle, wrapped_deg(angle), 360.0),
+    ):
+        turns = float((before - after) / whole)
+        assert -whole / 2 <= after <= whole / 2
+        assert turns == pytest.approx(round(turns), abs=1e-6)
