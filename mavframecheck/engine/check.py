@@ -10,7 +10,7 @@ from mavframecheck.engine.pack import chosen_rules
 from mavframecheck.engine.reading import Progress, Reading
 from mavframecheck.engine.runner import Onlooker, Runner
 from mavframecheck.engine.settings import Settings
-from mavframecheck.missions import read_mission
+from mavframecheck.missions import read_mission, uncollected
 from mavframecheck.missions.upload import ITEM, Upload
 from mavframecheck.model import FileReport, Finding, RuleRun, Vehicle
 from mavframecheck.semantics.names import family, type_name
@@ -126,6 +126,7 @@ def summed_up(reading: Reading, runner: Runner) -> tuple[FileReport, tuple[Findi
     return report, tuple(findings)
 
 
+@uncollected()
 def check_mission(
     file: Recording,
     pack: Pack,

@@ -63,7 +63,10 @@ class Table:
 
     def take(self, rows: Ints | Bools) -> Table:
         """Return a table of the rows at `rows`."""
-        return Table(self.layout, self._source, self._rows[rows], self.columns[rows])
+        if rows.dtype == np.bool_:
+            rows = np.flatnonzero(rows)
+        # `take`: indexing a structured array goes field by field, thirty times as slow.
+        return Table(self.layout, self._source, self._rows[rows], self.columns.take(rows))
 
     def only(self, holds: Bools) -> Table:
         """Return a table of the rows for which `holds`, (n,): itself where that is all of them."""
