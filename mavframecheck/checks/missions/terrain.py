@@ -97,6 +97,7 @@ class TerrainClearance(EachMission):
         super().__init__(params, dialect)
         self._blind = False
         self._whole_m = self._known_m = 0.0
+        self._covered = True
         self._reasons: list[str] = []
 
     def judge_all(self, plans: Plans, sent: list[Plan]) -> Iterator[Observation]:
@@ -156,13 +157,7 @@ class TerrainClearance(EachMission):
         self.looked += int(np.count_nonzero(np.isfinite(low.above_m)))
         self._whole_m += float(low.away_m.sum())
         self._known_m += float((low.away_m * low.known).sum())
-        if (low.known < 1).any():
-            share = self._known_m / self._whole_m if self._whole_m else float(low.known.mean())
-            part = np.floor(100 * share)  # all but a little is not all
-            self._reasons.append(
-                f"the terrain model covers {part:.0f} % of the mission"
-                + (f" ({self._whole_m / 1e3:.1f} km)" if self._whole_m else "")
-            )
+        self._covered &= bool((low.known == 1).all())
 
     def _found(
         self, plan: Plan, legs: Legs, low: Lowest, rows: Ints, level: Level, kind: str
@@ -212,8 +207,16 @@ class TerrainClearance(EachMission):
         """Return the legs that were judged, and why others were not."""
         if self._blind:
             return Verdict(0, idle="no terrain model was given (--dem FILE)")
-        why = "; ".join(dict.fromkeys(self._reasons))
+        why = "; ".join(dict.fromkeys([*self._reasons, *self._uncovered()]))
         return Verdict(self.looked, "" if self.looked else why, why)
+
+    def _uncovered(self) -> Iterator[str]:
+        """Say how much of the missions the terrain model covers, where that is not all."""
+        if not self._covered and self._whole_m:
+            part = np.floor(100 * self._known_m / self._whole_m)  # all but a little is not all
+            yield f"the terrain model covers {part:.0f} % of the mission ({self._whole_m / 1e3:.1f} km)"
+        elif not self._covered:
+            yield "the terrain model does not cover the mission"
 
 
 def _references(frames: Ints) -> set[AltRef]:
