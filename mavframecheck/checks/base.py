@@ -35,6 +35,8 @@ class Verdict(NamedTuple):
     """Why it could not decide, where it could not."""
     partly: str = ""
     """Where it looked at some streams: why it could not decide about the others."""
+    idle: str = ""
+    """Where there was nothing to look at: what it would have needed."""
 
 
 class Check(ABC):

@@ -11,6 +11,7 @@ from mavframecheck.cli.files import DONE, FAILED, Advance, Files
 from mavframecheck.cli.output import complain
 from mavframecheck.cli.progress import Progress
 from mavframecheck.cli.settings import Chosen
+from mavframecheck.geo.terrain import TerrainError
 from mavframecheck.report import Checked, Remark
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.words import plural
@@ -25,7 +26,12 @@ FINDINGS = 1
 class Audit(Files[Checked]):
     """The files of one `check`."""
 
-    usage_errors = (*Files.usage_errors, engine.SettingsError, engine.RuleFileError)
+    usage_errors = (
+        *Files.usage_errors,
+        engine.SettingsError,
+        engine.RuleFileError,
+        TerrainError,
+    )
 
     def __init__(
         self,

@@ -74,6 +74,12 @@ Give a recording or mission, a directory of them, or - for standard input. For e
     help="The mission that recordings were meant to fly: tracks are compared with it (MFC416).",
 )
 @click.option(
+    "--dem",
+    metavar="FILE",
+    type=click.Path(exists=True, dir_okay=False),
+    help="A terrain model (GeoTIFF): legs of missions are compared with the ground (MFC911).",
+)
+@click.option(
     "-v",
     "--verbose",
     is_flag=True,
@@ -94,6 +100,7 @@ def check(
     fix: bool,
     diff: bool,
     plan: str | None,
+    dem: str | None,
     **options: Any,
 ) -> None:
     """Judge recordings and missions: files, directories, or - for standard input.
@@ -111,7 +118,7 @@ def check(
     if not (paths or watch):
         click.echo(_EXAMPLE, err=True, nl=False)
         ctx.exit(2)
-    chosen = choose(plan=plan, **options)
+    chosen = choose(plan=plan, dem=dem, **options)
     if diff:
         _show_diff(ctx, paths, chosen)
     form = "statistics" if statistics else form or _default_format()

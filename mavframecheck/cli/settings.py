@@ -142,6 +142,7 @@ def choose(
     update_baseline: bool = False,
     input_kind: str | None = None,
     plan: str | None = None,
+    dem: str | None = None,
     **options: Any,
 ) -> Chosen:
     """Return what holds; a mistake in the file or on the command line is a usage error."""
@@ -167,6 +168,7 @@ def choose(
         preview=config.preview,
         autopilot=config.autopilot,
         plan=plan,
+        dem=dem or (str(folder / config.dem) if config.dem else None),
         input_kind=input_kind,
         overrides=config.params,
         dialect=config.dialect or DEFAULT_DIALECT,

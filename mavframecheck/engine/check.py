@@ -10,7 +10,7 @@ from mavframecheck.engine.pack import chosen_rules
 from mavframecheck.engine.reading import Progress, Reading
 from mavframecheck.engine.runner import Onlooker, Runner
 from mavframecheck.engine.settings import Settings
-from mavframecheck.missions import read_mission
+from mavframecheck.missions import read_mission, uncollected
 from mavframecheck.missions.upload import ITEM, Upload
 from mavframecheck.model import FileReport, Finding, RuleRun, Vehicle
 from mavframecheck.semantics.names import family, type_name
@@ -26,6 +26,7 @@ from mavframecheck.vehicle import Context
 from mavframecheck.wire import Dialect, load_dialect
 
 if TYPE_CHECKING:
+    from mavframecheck.geo.terrain import Ground
     from mavframecheck.model.trace import Detail
 
 
@@ -50,9 +51,10 @@ def check_recording(
     settings: Settings,
     dialect: Dialect,
     progress: Progress | None = None,
+    ground: Ground | None = None,
 ) -> tuple[FileReport, tuple[Finding, ...]]:
-    """Judge an open recording."""
-    return summed_up(*_judged(recording, pack, settings, dialect, progress))
+    """Judge an open recording, over `ground` where no terrain model is among the settings."""
+    return summed_up(*_judged(recording, pack, settings, dialect, progress, ground=ground))
 
 
 def draw_file(
@@ -90,11 +92,13 @@ def _judged(
     dialect: Dialect,
     progress: Progress | None,
     onlooker: Onlooker | None = None,
+    ground: Ground | None = None,
 ) -> tuple[Reading, Runner]:
     """Read and judge a recording to its end."""
     reading = Reading(recording, settings, dialect)
     if settings.plan is not None:
         Plans.of(reading.context).intend(_upload_of(settings.plan, settings, dialect).batch)
+    reading.remarks += _given_ground(reading.context, settings, ground)
     rules = chosen_rules(pack, settings)
     runner = Runner(
         recording.name,
@@ -122,15 +126,22 @@ def summed_up(reading: Reading, runner: Runner) -> tuple[FileReport, tuple[Findi
     return report, tuple(findings)
 
 
+@uncollected()
 def check_mission(
-    file: Recording, pack: Pack, settings: Settings, dialect: Dialect
+    file: Recording,
+    pack: Pack,
+    settings: Settings,
+    dialect: Dialect,
+    ground: Ground | None = None,
 ) -> tuple[FileReport, tuple[Finding, ...]]:
-    """Judge an open mission file with the rules that can be about mission items."""
+    """Judge an open mission file with the rules that can be about mission items, over `ground` as above."""
     planned = read_mission(file)
     upload = Upload(planned, dialect, settings.autopilot)
     chosen = chosen_rules(pack, settings)
     rules = [rule for rule in chosen if rule.may_judge(ITEM)]
-    runner = Runner(file.name, rules, Context(), dialect, upload=upload)
+    context = Context()
+    notes = [*planned.notes, *_given_ground(context, settings, ground)]
+    runner = Runner(file.name, rules, context, dialect, upload=upload)
     runner.update(upload.batch)
     findings, runs = runner.finish()
     reason = "a mission file holds nothing that the rule is about"
@@ -148,7 +159,7 @@ def check_mission(
         skipped_bytes=0,
         duration_s=None,
         time_start=None,
-        notes=tuple(planned.notes),
+        notes=tuple(notes),
         vehicles=_vehicles(upload),
         damage=(),
         damage_total=0,
@@ -164,6 +175,17 @@ def _upload_of(path: str, settings: Settings, dialect: Dialect) -> Upload:
             return Upload(read_mission(file), dialect, settings.autopilot)
     except NoRecordingError as error:  # what is asked for is a setting, not a file to judge
         raise SourceError(f"--plan: {error}") from error
+
+
+def _given_ground(context: Context, settings: Settings, ground: Ground | None) -> list[str]:
+    """Let the rules about missions know how high the ground lies; return what to say of the terrain model."""
+    if settings.dem is None:
+        Plans.of(context).ground = ground
+        return []
+    from mavframecheck.geo.terrain import Terrain
+
+    terrain = Plans.of(context).ground = Terrain(settings.dem)
+    return [terrain.note]
 
 
 def _vehicles(upload: Upload) -> tuple[Vehicle, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 from mavframecheck.engine.check import check_mission, check_recording
 from mavframecheck.engine.compiled import Pack
 from mavframecheck.engine.settings import Settings
+from mavframecheck.geo.terrain import Level
 from mavframecheck.model import Example, FileReport, Finding, Rule, Step
 from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.names import usual_vehicle
@@ -116,6 +117,12 @@ def _context_steps(context: dict[str, Any]) -> Iterator[Step]:
         yield Step(message="GLOBAL_POSITION_INT", sender="autopilot", fields=fields)
 
 
+def ground_of(example: Example) -> Level | None:
+    """Return the ground that `example` is flown over, None where it says nothing of it."""
+    height_m = example.context.get("ground_msl")
+    return None if height_m is None else Level(float(height_m))
+
+
 def run_example(
     rule: Rule, example: Example, source: str
 ) -> tuple[FileReport, tuple[Finding, ...]]:
@@ -123,8 +130,9 @@ def run_example(
     dialect = load_dialect()
     pack = Pack((rule,), {rule.code: source})
     settings = Settings(preview=True)
+    ground = ground_of(example)
     if example.file:
         written = Recording(rule.code, BytesIO(example.file.encode()), None)
-        return check_mission(written, pack, settings, dialect)
+        return check_mission(written, pack, settings, dialect, ground)
     opened = Recording(rule.code, BytesIO(recording(example, dialect)), None)
-    return check_recording(opened, pack, settings, dialect)
+    return check_recording(opened, pack, settings, dialect, ground=ground)

@@ -55,6 +55,8 @@ class Reading:
         self.damage: list[Damage] = []
         self.damage_total = 0
         self.counts = {"messages": 0, "unknown": 0, "bad_crc": 0, "skipped_bytes": 0}
+        self.remarks: list[str] = []
+        """What a reader of the report should know besides."""
         self._recording = recording
         self._dialect = dialect
         self._ranges = Ranges()
@@ -107,6 +109,7 @@ class Reading:
 
     def _notes(self) -> Iterator[str]:
         yield from self._recording.notes
+        yield from self.remarks
         if self.traffic.refused:
             yield (
                 f"{self.traffic.refused} frames of further senders or streams were read but not "

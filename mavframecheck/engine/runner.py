@@ -419,7 +419,8 @@ def _verdict_of(rule: CompiledRule, check: Check) -> RuleRun:
         return RuleRun(code=code, status="insufficient-data", reason=reason, checked=checked)
     if checked:
         return RuleRun(code=code, status="ran", checked=checked, reason=verdict.partly)
-    return RuleRun(code=code, status="not-applicable", reason=_what_was_missing(rule))
+    reason = verdict.idle or _what_was_missing(rule)
+    return RuleRun(code=code, status="not-applicable", reason=reason)
 
 
 def _what_was_missing(rule: CompiledRule) -> str:

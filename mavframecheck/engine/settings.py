@@ -25,6 +25,8 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True):
     """Family to assume where the recording does not say."""
     plan: str | None = None
     """Mission file that recordings are compared with."""
+    dem: str | None = None
+    """Terrain model that missions are compared with."""
     dialect: str = DEFAULT_DIALECT
     input_kind: str | None = None
     sender: int | None = None

@@ -8,14 +8,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 
-from mavframecheck.missions.located import Array, Members, Object, Value, arrays, numbers, parse
+from mavframecheck.missions.located import (
+    Array,
+    Members,
+    Object,
+    Value,
+    arrays,
+    decimals,
+    numbers,
+    parse,
+)
 from mavframecheck.missions.planned import (
     FENCE,
     MISSION,
     RALLY,
+    UNSAID,
     Home,
     Item,
+    LaterPlaces,
     Places,
     Planned,
     Said,
@@ -36,7 +48,7 @@ _RETURN = constant("MAV_CMD.NAV_FENCE_RETURN_POINT")
 _RALLY = constant("MAV_CMD.NAV_RALLY_POINT")
 _GLOBAL = constant("MAV_FRAME.GLOBAL")
 _ABOVE_HOME = constant("MAV_FRAME.GLOBAL_RELATIVE_ALT")
-_PARAMS = 7
+_PARAMS = tuple(f"param{k}" for k in (1, 2, 3, 4))
 
 
 def read_plan(text: Text) -> Planned:
@@ -95,12 +107,12 @@ def _mission(mission: Members, notes: list[str]) -> Iterator[Item]:
     complex_items = 0
     for box in mission.objects("items", "a mission item"):
         if box.box.get("type") != "ComplexItem":
-            yield _simple(box, Said(plan_altitude_mode=mode))
+            yield _simple(box, mode)
             continue
         complex_items += 1
         held = _held(box)
         for each in held:
-            yield _simple(each, Said(plan_altitude_mode=mode, complex_item=complex_items))
+            yield _simple(each, mode, complex_items)
         if not held:
             line = box.text.place(box.box.begin)[0]
             empty.append(f"{str(box.box.get('complexItemType'))[:40]} in line {line}")
@@ -118,9 +130,9 @@ def _held(box: Members) -> list[Members]:
     return list(inner.objects("Items", "a generated item")) if "Items" in inner.box else []
 
 
-def _simple(box: Members, said: Said) -> Item:
+def _simple(box: Members, plan_altitude_mode: float, complex_item: float = UNSAID) -> Item:
     """Return a mission item, also one of the older forms that keep the place in `coordinate`."""
-    values, places = _params(box)
+    values, (lat, lon) = _params(box)
     return Item(
         mission_type=MISSION,
         command=box.whole("command", most=65_535),
@@ -129,36 +141,40 @@ def _simple(box: Members, said: Said) -> Item:
         x=values[4],
         y=values[5],
         z=values[6],
-        places=Places(
-            box.box.begin, box.box.end, box.box.at["command"], box.box.at["frame"], *places
-        ),
+        places=LaterPlaces(partial(_places, box)),
         autocontinue=int(box.box.get("autoContinue") is not False),
-        said=said._replace(
-            x_decimals=box.text.decimals(places[4]),
-            y_decimals=box.text.decimals(places[5]),
+        said=Said(
+            x_decimals=decimals(lat),
+            y_decimals=decimals(lon),
             number=box.number("doJumpId", math.nan),
             altitude=box.number("Altitude", math.nan),
             altitude_mode=box.number("AltitudeMode", math.nan),
             terrain_altitude=box.number("AMSLAltAboveTerrain", math.nan),
+            plan_altitude_mode=plan_altitude_mode,
+            complex_item=complex_item,
         ),
     )
 
 
-def _params(box: Members) -> tuple[list[float], list[int]]:
-    """Return the seven parameters and where each is written."""
+def _params(box: Members) -> tuple[list[float], list[Value]]:
+    """Return the seven parameters, and latitude and longitude as they are written."""
     if "coordinate" not in box.box:
         params = box.array("params", (7,))
-        return numbers(box.text, params), params.at
+        return numbers(box.text, params), params[4:6]
     coordinate = box.array("coordinate", (3,))
     behind = numbers(box.text, coordinate)
     if "params" in box.box:
-        params = box.array("params", (4,))
-        return numbers(box.text, params) + behind, params.at + coordinate.at
-    names = [f"param{k}" for k in (1, 2, 3, 4)]
-    return [box.number(name) for name in names] + behind, [
-        *(box.box.at[name] for name in names),
-        *coordinate.at,
-    ]
+        return numbers(box.text, box.array("params", (4,))) + behind, coordinate[:2]
+    return [box.number(name) for name in _PARAMS] + behind, coordinate[:2]
+
+
+def _places(box: Members) -> Places:
+    """Return where an item and its parts stand."""
+    at = box.box.at
+    params = box.array("params").at if "params" in box.box else [at[name] for name in _PARAMS]
+    if "coordinate" in box.box:
+        params = params + box.array("coordinate").at
+    return Places(box.box.begin, box.box.end, at["command"], at["frame"], *params)
 
 
 def _fence(fence: Members) -> Iterator[Item]:
@@ -198,7 +214,7 @@ def _rally(rally: Members) -> Iterator[Item]:
 def _point(text: Text, place: Array, command: int, mission_type: int, frame: int) -> Item:
     """Return an item that is a bare place: latitude, longitude and perhaps a height."""
     lat, lon, z = numbers(text, place) + [0.0] * (3 - len(place))
-    at = place.at + [-1] * (3 - len(place))
+    at, (north, east) = place.at + [-1] * (3 - len(place)), place[:2]
     return Item(
         mission_type=mission_type,
         command=command,
@@ -208,5 +224,5 @@ def _point(text: Text, place: Array, command: int, mission_type: int, frame: int
         y=lon,
         z=z,
         places=Places(place.begin, place.end, x=at[0], y=at[1], z=at[2]),
-        said=Said(x_decimals=text.decimals(at[0]), y_decimals=text.decimals(at[1])),
+        said=Said(x_decimals=decimals(north), y_decimals=decimals(east)),
     )

@@ -6,9 +6,9 @@ Readers (`plan`, `wpl`, `points`) make a `Planned`; `upload` turns it into the b
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from mavframecheck.missions.text import Text
 
@@ -62,6 +62,23 @@ class Places(NamedTuple):
     z: int = -1
 
 
+class LaterPlaces:
+    """Places that are worked out when somebody asks: of a large mission that is a few."""
+
+    __slots__ = ("_find", "_found")
+
+    def __init__(self, find: Callable[[], Places]) -> None:
+        """Ask `find` once, if ever."""
+        self._find = find
+        self._found: Places | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what `Places` has of this name."""
+        if self._found is None:
+            self._found = self._find()
+        return getattr(self._found, name)
+
+
 class Item(NamedTuple):
     """An item as the file has it: latitude and longitude in degrees, a null as NaN."""
 
@@ -72,7 +89,7 @@ class Item(NamedTuple):
     x: float
     y: float
     z: float
-    places: Places
+    places: Places | LaterPlaces
     current: int = 0
     autocontinue: int = 1
     said: Said = Said()

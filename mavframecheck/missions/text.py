@@ -6,6 +6,7 @@ import functools
 import math
 import re
 from bisect import bisect_right
+from itertools import accumulate
 from typing import NoReturn
 
 from mavframecheck.sources import SourceError
@@ -31,7 +32,10 @@ class Text:
     @functools.cached_property
     def starts(self) -> list[int]:
         """Offsets at which lines begin; a line ends with LF, CR LF or CR."""
-        return [0, *(match.end() for match in _LINE_END.finditer(self.content))]
+        if self.content.count("\r") > self.content.count("\r\n"):
+            return [0, *(match.end() for match in _LINE_END.finditer(self.content))]
+        lengths = map(len, self.content.split("\n"))
+        return [0, *accumulate(map((1).__add__, lengths))][:-1]
 
     def place(self, offset: int) -> tuple[int, int]:
         """Return line and column of the character at `offset`, both counted from 1."""
@@ -40,10 +44,7 @@ class Text:
 
     def decimals(self, offset: int) -> float:
         """Return how many digits follow the decimal point of the number at `offset`; NaN where none is."""
-        match = _WRITTEN.match(self.content, offset)
-        if match is None or not match[0]:
-            return math.nan
-        return float(max(len(match[1] or "") - int(match[2] or 0), 0))
+        return decimals_of(self.number(offset))
 
     def number(self, offset: int) -> str:
         """Return the number that is written at `offset`."""
@@ -54,6 +55,17 @@ class Text:
         """Raise MissionError for the character at `offset`."""
         line, column = self.place(offset)
         raise MissionError(f"{self.name}, line {line}, column {column}: {problem}")
+
+
+def decimals_of(word: str) -> float:
+    """Return how many digits follow the decimal point of a number as it is written; NaN where none is."""
+    whole, point, fraction = word.partition(".")
+    if (fraction if point else whole).isdigit():
+        return float(len(fraction))
+    match = _WRITTEN.fullmatch(word)
+    if match is None or not word:
+        return math.nan
+    return float(max(len(match[1] or "") - int(match[2] or 0), 0))
 
 
 def decode(name: str, content: bytes) -> Text:

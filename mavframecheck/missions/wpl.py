@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from functools import partial
 from itertools import islice
-from typing import Final
+from typing import Final, NoReturn
 
 from mavframecheck.missions.planned import (
     FENCE,
@@ -19,12 +20,13 @@ from mavframecheck.missions.planned import (
     RALLY,
     Home,
     Item,
+    LaterPlaces,
     Places,
     Planned,
     Said,
     bounded,
 )
-from mavframecheck.missions.text import Text
+from mavframecheck.missions.text import Text, decimals_of
 from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.enums import AltRef
 from mavframecheck.semantics.mavframe import FRAMES
@@ -41,7 +43,10 @@ _HEADER = re.compile(r"\s*QGC[ \t]+WPL[ \t]+(\S+)[^\r\n]*")
 _LINE = re.compile(r"[^\r\n]+")
 _WORD = re.compile(r"[^ \t]+")
 _NUMBER = re.compile(
-    r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[-+]?nan", re.IGNORECASE
+    r"[-+]?(?:(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:e[-+]?[0-9]++)?|nan)", re.IGNORECASE
+)
+_ROW = re.compile(
+    r"[ \t]*" + r"[ \t]+".join([f"({_NUMBER.pattern})"] * len(COLUMNS)) + r"[ \t]*", re.IGNORECASE
 )
 _WHOLE = {0: 65_535, 1: 255, 2: 255, 3: 65_535, 11: 255}
 """Column -> largest value, of the columns that hold whole numbers."""
@@ -84,17 +89,26 @@ def _home(first: Item) -> Home | None:
 
 def _items(text: Text, begin: int) -> Iterator[Item]:
     for line in _LINE.finditer(text.content, begin):
+        row = _ROW.fullmatch(text.content, line.start(), line.end())
+        if row is not None:
+            yield _item(text, row)
+            continue
         words = list(islice(_WORD.finditer(text.content, line.start(), line.end()), _MOST_WORDS))
         if words and not words[0][0].startswith("#"):
-            yield _item(text, words)
+            _refuse(text, words)
 
 
-def _item(text: Text, words: list[re.Match[str]]) -> Item:
+def _item(text: Text, row: re.Match[str]) -> Item:
     """Return the item of a line."""
-    if len(words) != len(COLUMNS):
-        _wrong_columns(text, words)
-    v = [_number(text, column, word) for column, word in enumerate(words)]
-    at = [word.start() for word in words]
+    written = row.groups()
+    v = [float(word) for word in written]
+    for column, most in _WHOLE.items():
+        if not (0 <= v[column] <= most and v[column] == int(v[column])):
+            problem = f"{COLUMNS[column]} must be a whole number from 0 to {most}"
+            text.fail(row.start(column + 1), problem)
+    if math.inf in map(abs, v):
+        column = [*map(abs, v)].index(math.inf)
+        _no_number(text, row.start(column + 1), COLUMNS[column], written[column])
     return Item(
         mission_type=_KINDS.get(int(v[3]), MISSION),
         command=int(v[3]),
@@ -103,14 +117,35 @@ def _item(text: Text, words: list[re.Match[str]]) -> Item:
         x=v[8],
         y=v[9],
         z=v[10],
-        places=Places(at[0], words[-1].end(), at[3], at[2], *at[4:11]),
+        places=LaterPlaces(partial(_places, row)),
         current=int(v[1]),
         autocontinue=int(v[11]),
-        said=Said(x_decimals=text.decimals(at[8]), y_decimals=text.decimals(at[9]), number=v[0]),
+        said=Said(
+            x_decimals=decimals_of(written[8]), y_decimals=decimals_of(written[9]), number=v[0]
+        ),
     )
 
 
-def _wrong_columns(text: Text, words: list[re.Match[str]]) -> None:
+def _places(row: re.Match[str]) -> Places:
+    """Return where an item and its parts stand."""
+    at = [row.start(1 + column) for column in range(len(COLUMNS))]
+    return Places(at[0], row.end(len(COLUMNS)), at[3], at[2], *at[4:11])
+
+
+def _refuse(text: Text, words: list[re.Match[str]]) -> NoReturn:
+    """Fail at what makes the words of a line no item."""
+    if len(words) != len(COLUMNS):
+        _wrong_columns(text, words)
+    wrong = next(k for k, word in enumerate(words) if not _NUMBER.fullmatch(word[0]))
+    _no_number(text, words[wrong].start(), COLUMNS[wrong], words[wrong][0])
+
+
+def _no_number(text: Text, at: int, name: str, written: str) -> NoReturn:
+    hint = ": write a point, not a comma" if "," in written else ""
+    text.fail(at, f"{name} is {written[:40]!r}, which is no number{hint}")
+
+
+def _wrong_columns(text: Text, words: list[re.Match[str]]) -> NoReturn:
     """Fail at the first word that is no number, at the end of a short line, or at the first word too many."""
     for word in words:
         if not _NUMBER.fullmatch(word[0]):
@@ -119,15 +154,3 @@ def _wrong_columns(text: Text, words: list[re.Match[str]]) -> None:
         missing = ", ".join(COLUMNS[len(words) :])
         text.fail(words[-1].end(), f"{len(words)} columns where 12 belong: {missing} missing")
     text.fail(words[len(COLUMNS)].start(), "more than 12 columns")
-
-
-def _number(text: Text, column: int, word: re.Match[str]) -> float:
-    written = word[0]
-    if not _NUMBER.fullmatch(written) or math.isinf(float(written)):
-        hint = ": write a point, not a comma" if "," in written else ""
-        text.fail(word.start(), f"{COLUMNS[column]} is {written[:40]!r}, which is no number{hint}")
-    number = float(written)
-    most = _WHOLE.get(column)
-    if most is not None and not (0 <= number <= most and number == int(number)):
-        text.fail(word.start(), f"{COLUMNS[column]} must be a whole number from 0 to {most}")
-    return number

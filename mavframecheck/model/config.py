@@ -44,6 +44,8 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, rename="kebab", forbid_u
     """Directories of rule files, from the folder of the configuration file."""
     baseline: str | None = None
     """Baseline file, from the folder of the configuration file."""
+    dem: str | None = None
+    """Terrain model, from the folder of the configuration file."""
     severity: dict[str, Severity] = {}
     """Rule to the severity of all its findings."""
     params: dict[str, dict[str, int | float | str | bool]] = {}

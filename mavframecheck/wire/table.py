@@ -41,7 +41,10 @@ class Table:
     @functools.cached_property
     def columns(self) -> npt.NDArray[np.void]:
         """(n,) structured, payloads zero-extended."""
-        return self._payloads if self._picked is None else self._payloads[self._picked]
+        if self._picked is None:
+            return self._payloads
+        # Indexing a structured array goes field by field, thirty times as slow.
+        return self._payloads.take(self._picked)
 
     def __len__(self) -> int:
         """Return the number of rows."""

@@ -9,7 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavframecheck.missions.located import DEEPEST, MOST_VALUES, Array, Object, Value, parse
+from mavframecheck.missions.located import (
+    DEEPEST,
+    MOST_VALUES,
+    Array,
+    Object,
+    Value,
+    decimals,
+    parse,
+)
 from mavframecheck.missions.text import MissionError, Text, decode
 
 VALUES = st.recursive(
@@ -87,6 +95,43 @@ def test_every_value_stands_where_it_says(value: Any, indent: int | None) -> Non
         if isinstance(each, Object | Array):
             assert written[each.begin] in "[{"
             assert json.loads(written[each.begin : each.end]) == each
+
+
+FLAT = st.dictionaries(
+    st.text(max_size=3),
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=4)
+    | st.lists(VALUES),
+)
+
+
+@given(st.lists(FLAT, max_size=4), st.sampled_from([None, 3]))
+def test_the_quick_way_and_the_slow_one(value: Any, indent: int | None) -> None:
+    """They read and refuse the same, and know the same places, in whatever order they are asked for."""
+    text = Text("f", json.dumps(value, indent=indent))
+    results = []
+    for quick in (True, False):
+        try:
+            results.append(places(parse(text, quick=quick), 0))
+        except MissionError as error:
+            results.append([(0, str(error))])
+    assert results[0] == results[1]
+
+
+def test_an_array_is_asked_before_its_object() -> None:
+    """Objects that are read the quick way know where their arrays are."""
+    found = parse(Text("f", '[{"a": 1, "b": [2, 3.50]}]'))
+    assert isinstance(found, Array)
+    box = found[0]
+    assert isinstance(box, Object)
+    inner = box["b"]
+    assert isinstance(inner, Array)
+    assert (inner.at, inner.begin, inner.end) == ([16, 19], 15, 24)
+    assert [decimals(value) for value in inner] == [0.0, 2.0]
+    assert box.at == {"a": 7, "b": 15}
 
 
 @pytest.mark.parametrize(

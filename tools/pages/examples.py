@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from mavframecheck import __version__
 from mavframecheck.engine import Pack, Settings
 from mavframecheck.engine.check import check_mission, check_recording
-from mavframecheck.engine.examples import recording, sender_of
+from mavframecheck.engine.examples import ground_of, recording, sender_of
 from mavframecheck.model import ByteLocation, Example, Rule, Step
 from mavframecheck.report import Checked, Context
 from mavframecheck.report.text import render
@@ -43,7 +43,8 @@ def judged(rule: Rule) -> Judged:
     name = _MISSION if example.file else _RECORDING
     pack, settings = Pack((rule,), {rule.code: rule.code}), Settings(preview=True)
     check = check_mission if example.file else check_recording
-    checked = Checked(*check(Recording(name, BytesIO(data), None), pack, settings, dialect))
+    opened, ground = Recording(name, BytesIO(data), None), ground_of(example)
+    checked = Checked(*check(opened, pack, settings, dialect, ground=ground))
     return Judged(example, name, data, checked)
 
 
@@ -56,6 +57,7 @@ def shown(rule: Rule, found: Judged) -> Iterator[str]:
         yield from _sent(found)
     yield "What the tool prints for it:"
     options = " --preview" if rule.status == "preview" else ""
+    options += " --dem ground.tif" if ground_of(found.example) else ""
     command = f"$ mavframecheck check --select {rule.code}{options} {found.name}"
     report = "".join(render([found.checked], _context()))
     yield fence(f"{command}\n{report}")
@@ -84,6 +86,8 @@ def _before(example: Example) -> str:
 
 def _known(key: str, value: Any) -> str:
     """Return one thing of the context in words."""
+    if key == "ground_msl":
+        return f"flat ground {scalar(value)} m above the sea"
     if not isinstance(value, Mapping):
         return FAMILY_NAMES.get(value, text(str(value)))
     place = f"{key} at {scalar(value['lat'])}, {scalar(value['lon'])}"

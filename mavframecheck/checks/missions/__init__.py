@@ -10,6 +10,7 @@ from mavframecheck.checks.missions.order import Sequence
 from mavframecheck.checks.missions.profile import AltitudeProfile
 from mavframecheck.checks.missions.readback import Differs
 from mavframecheck.checks.missions.rounded import Rounded
+from mavframecheck.checks.missions.terrain import TerrainClearance
 from mavframecheck.checks.missions.track import TrackAgainstPlan
 from mavframecheck.checks.missions.yaw import ZeroYaw
 
@@ -21,6 +22,7 @@ __all__ = [
     "PlanHeights",
     "Rounded",
     "Sequence",
+    "TerrainClearance",
     "TrackAgainstPlan",
     "ZeroYaw",
 ]

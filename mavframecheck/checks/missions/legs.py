@@ -8,6 +8,8 @@ import numpy as np
 
 from mavframecheck.checks.base import Observation
 from mavframecheck.checks.missions.plans import (
+    CLIMBED,
+    FLOWN,
     REFERENCE,
     Bools,
     EachMission,
@@ -19,24 +21,8 @@ from mavframecheck.checks.missions.plans import (
 )
 from mavframecheck.geo.geodesy import distance_m
 from mavframecheck.missions import Items
-from mavframecheck.semantics.constants import constant
 from mavframecheck.semantics.enums import AltRef
 
-_CLIMBED = np.array(
-    [constant(f"MAV_CMD.{name}") for name in ("NAV_WAYPOINT", "NAV_SPLINE_WAYPOINT")]
-)
-"""Commands that a fixed wing climbs to on its way; at others it may climb in circles."""
-_FLOWN = np.array(
-    [
-        *_CLIMBED.tolist(),
-        *(
-            constant(f"MAV_CMD.{name}")
-            for name in ("NAV_LOITER_UNLIM", "NAV_LOITER_TURNS", "NAV_LOITER_TIME", "NAV_LAND")
-        ),
-        *(constant(f"MAV_CMD.{name}") for name in ("NAV_VTOL_LAND", "NAV_LOITER_TO_ALT")),
-    ]
-)
-"""Commands that the vehicle flies to."""
 _LEVEL = ("ardurover",)
 """Families whose vehicles do not climb."""
 _NEAR_NULL_DEG = 1e-3
@@ -51,7 +37,7 @@ class ImplausibleLeg(EachMission):
         """Yield the worst leg of a mission, with the number of such legs."""
         items = plan.items
         somewhere = np.maximum(np.abs(items.x), np.abs(items.y)) > _NEAR_NULL_DEG
-        flown = with_place(items) & somewhere & np.isin(items.command, _FLOWN)
+        flown = with_place(items) & somewhere & np.isin(items.command, FLOWN)
         rows = np.flatnonzero(flown & (items.seq >= plan.first))
         if len(rows) < 2:
             return
@@ -83,7 +69,7 @@ class ImplausibleLeg(EachMission):
         items = plan.items
         reference = np.array([REFERENCE.get(frame, AltRef.NONE) for frame in items.frame.tolist()])
         told = (reference[a] == reference[b]) & np.isin(reference[a], (AltRef.MSL, AltRef.HOME))
-        told &= np.isin(items.command[a], _CLIMBED) & np.isin(items.command[b], _CLIMBED)
+        told &= np.isin(items.command[a], CLIMBED) & np.isin(items.command[b], CLIMBED)
         told &= plan.family not in _LEVEL
         winged = plan.family == "arduplane"
         grade = self.params["wing_grade" if winged else "rotor_grade"]

@@ -9,7 +9,7 @@ import weakref
 from abc import abstractmethod
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,9 @@ from mavframecheck.semantics.mavframe import FRAMES, GLOBAL_FRAMES
 from mavframecheck.semantics.names import family
 from mavframecheck.vehicle import Context
 from mavframecheck.wire import Batch, Dialect, Table
+
+if TYPE_CHECKING:
+    from mavframecheck.geo.terrain import Ground
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -46,10 +49,25 @@ _SAME_DEG, _SAME_M = 5e-5, 1.0
 
 REFERENCE = {facts.id: facts.alt_ref for facts in FRAMES}
 """MAV_FRAME -> what heights in it are above."""
+CLIMBED = np.array(
+    [constant(f"MAV_CMD.{name}") for name in ("NAV_WAYPOINT", "NAV_SPLINE_WAYPOINT")]
+)
+"""Commands that a fixed wing climbs to on its way; at others it may climb in circles."""
+FLOWN = np.array(
+    [
+        *CLIMBED.tolist(),
+        *(
+            constant(f"MAV_CMD.{name}")
+            for name in ("NAV_LOITER_UNLIM", "NAV_LOITER_TURNS", "NAV_LOITER_TIME", "NAV_LAND")
+        ),
+        *(constant(f"MAV_CMD.{name}") for name in ("NAV_VTOL_LAND", "NAV_LOITER_TO_ALT")),
+    ]
+)
+"""Commands that the vehicle flies to."""
+LANDINGS = np.array([constant("MAV_CMD.NAV_LAND"), constant("MAV_CMD.NAV_VTOL_LAND")])
+"""Commands whose height is the ground, or not read."""
 _PLACES = np.array(sorted(location_commands()))
 _PLACED = np.array(sorted(set(altitude_commands()) & set(location_commands())))
-_NO_HEIGHT = np.array([constant("MAV_CMD.NAV_LAND"), constant("MAV_CMD.NAV_VTOL_LAND")])
-"""Commands whose height is the ground, or not read."""
 
 
 class Plan(NamedTuple):
@@ -97,6 +115,8 @@ class Plans:
         """What `finished` found, until more is read."""
         self.intended: list[Plan] = []
         """The plan that was given beside the recording, if any."""
+        self.ground: Ground | None = None
+        """How high the ground lies, where a terrain model was given."""
 
     @staticmethod
     def of(context: Context) -> Plans:
@@ -121,14 +141,16 @@ class Plans:
         self._finished = None
         told = batch.tables.get("HOME_POSITION")
         if told is not None:
-            _remember(self._homes, told, told["altitude"].astype(float) * 1e-3)
+            places = np.column_stack((told["latitude"], told["longitude"])) * 1e-7
+            _remember(self._homes, told, told["altitude"].astype(float) * 1e-3, places)
         positions = batch.tables.get("GLOBAL_POSITION_INT")
         if positions is not None:
             placed = positions.take(
                 np.flatnonzero((positions["lat"] != 0) | (positions["lon"] != 0))
             )
             difference = placed["alt"].astype(float) - placed["relative_alt"]
-            _remember(self._differences, placed, difference * 1e-3)
+            nowhere = np.full((len(placed), 2), np.nan)  # where the vehicle is, home need not be
+            _remember(self._differences, placed, difference * 1e-3, nowhere)
         if "HEARTBEAT" in batch.tables:
             for sysid, known, mav_type in _flown(batch.tables["HEARTBEAT"]):
                 self._vehicles.setdefault(sysid, (known, mav_type))
@@ -212,11 +234,22 @@ class Plans:
             heights = kept.get(plan.vehicle)
             found = heights.at(number) if heights is not None else None
             if found is not None:
-                return found
+                return found.height_m
         items = plan.items
         says_home = items.seq[0] == 0 and REFERENCE.get(int(items.frame[0])) == AltRef.MSL
         if plan.first == 1 and says_home and items.z[0] != 0:
             return float(items.z[0])
+        return None
+
+    def home_place(self, plan: Plan) -> tuple[float, float] | None:
+        """Return latitude and longitude of home when a mission was sent, degrees: as said, else of item 0."""
+        heights = self._homes.get(plan.vehicle)
+        found = heights.at(plan.mission.ended) if heights is not None else None
+        if found is not None:
+            return found.lat, found.lon
+        items = plan.items
+        if plan.first == 1 and items.seq[0] == 0 and with_place(items)[0]:
+            return float(items.x[0]), float(items.y[0])
         return None
 
 
@@ -289,37 +322,46 @@ class EachMission(MissionCheck):
         """Yield what is wrong with a mission."""
 
 
+class _Home(NamedTuple):
+    """Home, as it was from a frame on."""
+
+    number: int
+    height_m: float
+    lat: float
+    lon: float
+
+
 class _Heights:
     """Heights of home, where they changed, in frame order."""
 
     def __init__(self) -> None:
-        self._numbers: list[int] = []
-        self._values: list[float] = []
+        self._kept: list[_Home] = []
 
-    def add(self, numbers: Ints, heights: Floats) -> None:
+    def add(self, numbers: Ints, heights: Floats, places: Floats) -> None:
         """Keep each height that differs by more than a step from the one kept before."""
         row = 0
-        while len(self._values) < MAX_HOMES:
-            last = self._values[-1] if self._values else np.nan
+        while len(self._kept) < MAX_HOMES:
+            last = self._kept[-1].height_m if self._kept else np.nan
             changed = np.flatnonzero(~(np.abs(heights[row:] - last) < HOME_STEP_M))
             if not len(changed):
                 return
             row += int(changed[0])
-            self._numbers.append(int(numbers[row]))
-            self._values.append(float(heights[row]))
+            lat, lon = places[row].tolist()
+            self._kept.append(_Home(int(numbers[row]), float(heights[row]), lat, lon))
             row += 1
 
-    def at(self, number: int) -> float | None:
-        """Return the height that held at a frame, else the first one known."""
-        before = bisect_right(self._numbers, number) - 1
-        return self._values[max(before, 0)] if self._values else None
+    def at(self, number: int) -> _Home | None:
+        """Return what held at a frame, else the first one known."""
+        before = bisect_right(self._kept, number, key=lambda kept: kept.number) - 1
+        return self._kept[max(before, 0)] if self._kept else None
 
 
-def _remember(kept: dict[int, _Heights], table: Table, heights: Floats) -> None:
+def _remember(kept: dict[int, _Heights], table: Table, heights: Floats, places: Floats) -> None:
+    """Keep (n,) heights and (n, 2) latitudes and longitudes of what each system says."""
     for sysid in np.unique(table.frames.sysid).tolist():
         rows = np.flatnonzero(table.frames.sysid == sysid)
         numbers = table.frames.number[rows].astype(np.int64)
-        kept.setdefault(sysid, _Heights()).add(numbers, heights[rows])
+        kept.setdefault(sysid, _Heights()).add(numbers, heights[rows], places[rows])
 
 
 def _flown(beats: Table) -> Iterator[tuple[int, str, int]]:
@@ -358,7 +400,7 @@ def with_place(items: Items) -> Bools:
 
 def with_height(items: Items) -> Bools:
     """Return (n,) items with a place and a height that is flown."""
-    placed = np.isin(items.command, _PLACED) & ~np.isin(items.command, _NO_HEIGHT)
+    placed = np.isin(items.command, _PLACED) & ~np.isin(items.command, LANDINGS)
     somewhere = (items.x != 0) | (items.y != 0)
     whole = placed & np.isin(items.frame, GLOBAL_FRAMES) & somewhere & np.isfinite(items.z)
     return np.asarray(whole)
