@@ -344,7 +344,7 @@ class StampStream:
         starts, ends, _ = _stretches(knots["stretch"])
         lag = knots["low_t_us"] - knots["low_stamp"] * self.field.unit_us
         low = _lowest(lag, starts, ends)
-        joined = knots[starts]
+        joined = knots.take(starts)
         joined["rows"] = np.add.reduceat(knots["rows"], starts)
         for name in ("last_number", "last_t_us", "last_stamp"):
             joined[name] = knots[name][ends]

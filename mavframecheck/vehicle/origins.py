@@ -344,7 +344,7 @@ class _Vehicle:
             return pairs
         highest = np.maximum.accumulate(np.maximum(pairs["t_ms"], self._highest_ms))
         self._highest_ms = int(highest[-1])
-        return pairs[pairs["t_ms"] >= highest - FALL_MS]
+        return pairs.take(np.flatnonzero(pairs["t_ms"] >= highest - FALL_MS))
 
     def _disagree(self, rows: Rows) -> Bools:
         """Return (n,) pairs that do not fit the origin in force; all of them where there is none."""

@@ -92,7 +92,7 @@ class Pairing:
         apart_ms = np.abs(locals_["t_ms"][one] - globals_["t_ms"][other])
         kept = np.flatnonzero((number > known) & (apart_ms <= APART_MS))
         kept = kept[np.argsort(number[kept], kind="stable")]
-        return _pairs(locals_[one[kept]], globals_[other[kept]])
+        return _pairs(locals_.take(one[kept]), globals_.take(other[kept]))
 
     def forget(self) -> None:
         """Forget the last positions: the vehicle was started anew."""
