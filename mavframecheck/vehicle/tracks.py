@@ -101,6 +101,24 @@ def _blowing(table: Table) -> Floats:
     return np.column_stack((speed * np.cos(towards), speed * np.sin(towards), table["speed_z"]))
 
 
+def _mount_heading(table: Table) -> Floats:
+    """Return (n, 3) what MOUNT_ORIENTATION makes of the heading of its vehicle: one yaw less the other, rad."""
+    yaw, absolute = (table[name].astype(np.float64) for name in ("yaw", "yaw_absolute"))
+    said = table.present("yaw_absolute") & np.isfinite(yaw) & np.isfinite(absolute)
+    return _only_yaw(np.radians(np.where(said, absolute, np.nan) - np.where(said, yaw, 0.0)))
+
+
+def _delta_heading(table: Table) -> Floats:
+    """Return (n, 3) the heading of its vehicle that a gimbal says beside its pose, rad; 0 is not filled in."""
+    heading = table["delta_yaw"].astype(np.float64)
+    return _only_yaw(np.where(table.present("delta_yaw") & (heading != 0), heading, np.nan))
+
+
+def _only_yaw(yaw: Floats) -> Floats:
+    level = np.where(np.isfinite(yaw), 0.0, np.nan)
+    return np.column_stack((level, level, yaw))
+
+
 _XYZ = _fields("x", "y", "z")
 _VXYZ = _fields("vx", "vy", "vz")
 _RPY = _fields("roll", "pitch", "yaw")
@@ -143,6 +161,13 @@ SOURCES: dict[str, Source] = {
         valid=lambda table: np.asarray(table["type_mask"] & _ATTITUDE_IGNORED == 0),
         variant=("target_system", "type_mask"),
     ),
+    "AUTOPILOT_STATE_FOR_GIMBAL_DEVICE": Source(
+        attitude=_array("q"), stamp=_fields("time_boot_us", scale=1e-6)
+    ),
+    "GIMBAL_DEVICE_ATTITUDE_STATUS": Source(
+        attitude=_delta_heading, stamp=_BOOT_MS, euler=True, variant=("gimbal_device_id",)
+    ),
+    "MOUNT_ORIENTATION": Source(attitude=_mount_heading, stamp=_BOOT_MS, euler=True),
     "VISION_SPEED_ESTIMATE": Source(velocity=_XYZ, stamp=_USEC),
     "ATT_POS_MOCAP": Source(place=_XYZ, attitude=_array("q"), stamp=_TIME_USEC),
     "ODOMETRY": Source(

@@ -23,6 +23,7 @@ from mavframecheck.checks.motion.checks import (
 )
 from mavframecheck.checks.motion.commanded import AttitudeFrame, Response
 from mavframecheck.checks.motion.representations import Representations
+from mavframecheck.checks.motion.stale import StalePose
 from mavframecheck.checks.motion.wind import WindDirection
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "Response",
     "SensorMount",
     "SpeedFrame",
+    "StalePose",
     "Unaligned",
     "VectorFrame",
     "Vertical",
