@@ -7,6 +7,7 @@ where batches are cut. Samples with receive times that cannot be believed, or th
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -14,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.semantics import catalogue
+from mavframecheck.semantics.tags import FieldTag
 from mavframecheck.vehicle.clocks import Seen, seen
 from mavframecheck.wire import Batch, Table
 
@@ -130,7 +133,10 @@ _USEC = _fields("usec", scale=1e-6)
 _TIME_USEC = _fields("time_usec", scale=1e-6)
 _BOOT_MS = _fields("time_boot_ms", scale=1e-3)
 
-SOURCES: dict[str, Source] = {
+NO_RATES = ("RAW_IMU", "SET_ATTITUDE_TARGET", "ATTITUDE_TARGET", "MANUAL_SETPOINT")
+"""Rates without a unit, and rates that are asked for."""
+
+_SOURCES: dict[str, Source] = {
     "GLOBAL_POSITION_INT": Source(
         place=_geodetic("lat", "lon", "alt"),
         velocity=_fields("vx", "vy", "vz", scale=1e-2),
@@ -196,7 +202,43 @@ SOURCES: dict[str, Source] = {
         variant=("id",),
     ),
 }
-"""Messages that are followed."""
+
+
+def _rates_by_tag() -> Iterator[tuple[str, Source]]:
+    """Yield every message that measures the turning of a body, by its tags, and how it says it."""
+    for first in catalogue.find(quantity="angular_rate", axis="forward"):
+        found = catalogue.partners(first)
+        rates = [found.get(name) for name in ("rollspeed", "pitchspeed", "yawspeed")]
+        if first.message not in NO_RATES and all(rates) and rates[0] is first:
+            known = _SOURCES.get(first.message, Source(variant=_instance(first)))
+            tags = [tag for tag in rates if tag is not None]
+            yield first.message, known._replace(rates=_by_tags(tags))
+
+
+def _instance(tag: FieldTag) -> tuple[str, ...]:
+    return (tag.instance_field,) if tag.instance_field else ()
+
+
+def _by_tags(tags: list[FieldTag]) -> Reader:
+    """Return what reads (n, 3) the fields of three tags in SI, NaN where a mask says that they are not given."""
+
+    def read(table: Table) -> Floats:
+        values: Floats = np.column_stack(
+            [table[t.field].astype(np.float64) * t.scale for t in tags]
+        )
+        for column, tag in enumerate(tags):
+            if tag.ignore_field:
+                is_set = table[tag.ignore_field].astype(np.int64) & tag.ignore_bit != 0
+                values[is_set == tag.ignore_when_set, column] = np.nan
+        return values
+
+    return read
+
+
+@functools.cache
+def sources() -> dict[str, Source]:
+    """Return the messages that are followed."""
+    return _SOURCES | dict(_rates_by_tag())
 
 
 class TrackKey(NamedTuple):
@@ -299,9 +341,9 @@ class Tracks:
         if self.t0_us is None and frames.t_valid.any():
             self.t0_us = int(frames.t_us[np.argmax(frames.t_valid)])
             self.timed = True
-        for name in batch.tables.keys() & SOURCES.keys():
+        for name in batch.tables.keys() & sources().keys():
             table = batch.tables[name]
-            source = SOURCES[name]
+            source = sources()[name]
             good = table.frames.t_valid & (table.frames.t_us >= table.frames.clock_us - LATE_US)
             if source.valid is not None:
                 good &= source.valid(table)
@@ -314,7 +356,7 @@ class Tracks:
             if len(self.tracks) >= MAX_TRACKS:
                 return
             at = seen(table.frames, 0)
-            track = self.tracks[key] = Track(key, SOURCES[key.message], at, at)
+            track = self.tracks[key] = Track(key, sources()[key.message], at, at)
         since = table.frames.t_us - (self.t0_us or 0)
         bins = np.maximum(since // BIN_US, 0)
         while int(bins.max()) // WINDOW_BINS >> self._level >= MAX_WINDOWS:

@@ -22,6 +22,7 @@ from mavframecheck.checks.motion.checks import (
     YawSign,
 )
 from mavframecheck.checks.motion.commanded import AttitudeFrame, Response
+from mavframecheck.checks.motion.gyros import Units
 from mavframecheck.checks.motion.representations import Representations
 from mavframecheck.checks.motion.stale import StalePose
 from mavframecheck.checks.motion.wind import WindDirection
@@ -42,6 +43,7 @@ __all__ = [
     "SpeedFrame",
     "StalePose",
     "Unaligned",
+    "Units",
     "VectorFrame",
     "Vertical",
     "WindDirection",

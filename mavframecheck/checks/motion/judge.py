@@ -192,12 +192,12 @@ class Judge:
         for track in list(self._tracks.tracks.values()):
             asked = self.only in (None, track.key.sender)
             if asked and track.key.message in (*POSES, *VELOCITIES):
-                system = self._about(track.key.sender)
+                system = self.about(track.key.sender)
                 own = self._roles[track.key.sender] == "autopilot"
                 if not (own and track.key.message == "ODOMETRY"):
                     yield self._subject(track, system, own=own)
 
-    def _about(self, sender: int) -> int:
+    def about(self, sender: int) -> int:
         """Return the system a sender speaks of: its own, else the only one with an autopilot."""
         systems = {each >> 8 for each, role in self._roles.items() if role == "autopilot"}
         if sender >> 8 in systems:
