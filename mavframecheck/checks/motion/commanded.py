@@ -76,7 +76,7 @@ class Response(Check):
 
     def verdict(self) -> Verdict:
         """Return the setpoints that could be compared, or what was missing."""
-        if not self._holds.rows:
+        if not any(self.concerns_sender(sender) for sender in self._holds.senders):
             return Verdict(0)
         told = [found for found, _, answer in self._answers() if isinstance(answer, Answer)]
         if told:
@@ -93,7 +93,8 @@ class Response(Check):
 
     def _compared(self) -> Iterator[tuple[list[Sample], str, Answer | str]]:
         kinds: dict[tuple[int, int], dict[str, list[Sample]]] = {}
-        for hold in self._holds.finish():
+        mine = (each for each in self._holds.finish() if self.concerns_sender(each.sender))
+        for hold in mine:
             motion = self._motion(hold.system)
             for sample in response.samples(hold, motion) if motion is not None else ():
                 of = kinds.setdefault((hold.sender, hold.system), {})
@@ -177,7 +178,8 @@ class AttitudeFrame(Check):
     def _lies(self) -> list[tuple[Track, attitude.Lie | str]]:
         if self._told is None and self._judge is not None:
             tracks = self._judge.tracks_of("SET_ATTITUDE_TARGET")
-            self._told = [(track, _lie(track, self._judge)) for track in tracks]
+            mine = [track for track in tracks if self.concerns_sender(track.key.sender)]
+            self._told = [(track, _lie(track, self._judge)) for track in mine]
         return self._told or []
 
 
