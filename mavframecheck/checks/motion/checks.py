@@ -483,7 +483,7 @@ class SpeedFrame(VectorFrame):
     """Velocities from vision that are in the axes of the body."""
 
     message = "VISION_SPEED_ESTIMATE"
-    right = ("labelled", "inverse", "enu")
+    right = ("labelled", "inverse", "enu", "nwu")
 
 
 class EstimateScale(MotionCheck):

@@ -78,13 +78,13 @@ class Response(Check):
         """Return the setpoints that could be compared, or what was missing."""
         if not any(self.concerns_sender(sender) for sender in self._holds.senders):
             return Verdict(0)
-        told = [found for found, _, answer in self._answers() if isinstance(answer, Answer)]
-        if told:
-            return Verdict(sum(each.hold.rows for found in told for each in found))
-        reasons = {f"{what}: {answer}" for _, what, answer in self._answers()}
-        return Verdict(
-            0, "; ".join(sorted(reasons)) or "no setpoint was held while the vehicle obeyed"
-        )
+        answers = self._answers()
+        told = [found for found, _, answer in answers if not _undecided(answer)]
+        rows = sum(each.hold.rows for found in told for each in found)
+        if rows:
+            lost = [each for each in answers if isinstance(each[2], Answer)]
+            return Verdict(rows, partly=_reasons(lost))
+        return Verdict(0, _reasons(answers) or "no setpoint was held while the vehicle obeyed")
 
     def _answers(self) -> list[tuple[list[Sample], str, Answer | str]]:
         if self._told is None:
@@ -114,6 +114,25 @@ class Response(Check):
         return Motion(
             judge.series(place), attitudes, 1.0 if attitudes is None else rate_of(attitudes)
         )
+
+
+def _undecided(answer: Answer | str) -> str:
+    """Return why an answer tells nothing; nothing where it does.
+
+    A vehicle that does not follow at all may have its reasons: an option that gives the yaw to the way it flies or to a
+    region of interest, a limit, an obstacle. That is no matter of frames.
+    """
+    if isinstance(answer, str):
+        return answer
+    if answer.kind != "undecided":
+        return ""
+    return "the vehicle does not follow it, neither turned nor reversed: something else may decide"
+
+
+def _reasons(answers: list[tuple[list[Sample], str, Answer | str]]) -> str:
+    """Return for each kind of setpoint that tells nothing why."""
+    reasons = {f"{what}: {why}" for _, what, answer in answers if (why := _undecided(answer))}
+    return "; ".join(sorted(reasons))
 
 
 def _of_stream(kinds: dict[str, list[Sample]]) -> Iterator[tuple[list[Sample], str, Answer | str]]:
