@@ -29,6 +29,7 @@ LEAST_FIXES = 30
 TURN = np.radians(40.0)
 TILT = np.radians(4.0)
 TILTED_S = 4.0
+SWING, SWINGS_S = np.radians(30.0), 9.0
 SLIDING, SLOW_MPS = 0.25, 0.6
 SPREAD_MPS, ANOTHER = 0.6, 0.985
 _METRES = 111_200.0
@@ -53,6 +54,8 @@ class Excitation(NamedTuple):
     """4 s with roll, 4 s with pitch and 4 s with a difference between them of 4 degrees."""
     slides: bool
     """Its speed across the nose is a quarter of its speed."""
+    swings: bool
+    """The heading turns by 30 degrees in 2 s, and that for 9 s of them."""
 
     def has(self, needs: tuple[str, ...], delay_s: float) -> bool:
         """Return whether there is enough of everything in `needs`; `varies` for such a delay."""
@@ -84,6 +87,7 @@ def excitation(log: Log, stream: Table) -> Excitation:
         turn=bool(2 * np.percentile(spread, 95) >= TURN),
         tilt=tilted >= TILTED_S,
         slides=_slides(place, yaw),
+        swings=_seconds(np.abs(np.angle(np.exp(1j * (yaw[20:] - yaw[:-20])))) > SWING) >= SWINGS_S,
     )
 
 

@@ -20,7 +20,7 @@ from mavframecheck.model import Finding, Rule
 from mavframecheck.sources import Recording
 from mavframecheck.wire import load_dialect
 
-FAMILIES = ("MFC1", "MFC2", "MFC3", "MFC408", "MFC416", "MFC6", "MFC707", "MFC9")
+FAMILIES = ("MFC1", "MFC2", "MFC3", "MFC408", "MFC416", "MFC419", "MFC6", "MFC707", "MFC9")
 """Beginnings of the codes that are measured."""
 LOUD = ("error", "warning")
 

@@ -99,7 +99,9 @@ class Distortion(_Part, frozen=True):
     """Instead of `set`: the fields whose signed permutations are the cases, all but the right one."""
     free_heading: bool = False
     """Whether turns about the vertical are no mistake."""
-    needs: tuple[Literal["across", "climb", "turn", "tilt", "far", "varies", "slides"], ...] = ()
+    needs: tuple[
+        Literal["across", "climb", "turn", "tilt", "far", "varies", "slides", "swings"], ...
+    ] = ()
     """The motion that the method needs to tell: see `excitation.py`."""
     where: str = "True"
     """Holds for every row of a stream that it is about."""

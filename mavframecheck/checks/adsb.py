@@ -136,8 +136,9 @@ class _Traffic(Check):
 
     def verdict(self) -> Verdict:
         """Return the reports of senders of whom it can be told."""
-        told = sum(sender.rows for sender in self._senders.values() if self.enough(sender))
-        if self._senders and not told:
+        mine = [state for key, state in self._senders.items() if self.concerns_sender(key)]
+        told = sum(sender.rows for sender in mine if self.enough(sender))
+        if mine and not told:
             return Verdict(0, "no aircraft moves far enough between its reports")
         return Verdict(told)
 

@@ -65,9 +65,10 @@ class ClockCheck(Check):
         """Return the stamped rows of the streams looked at."""
         judged = (each for each in self.judged() if self.concerns_sender(each.sender))
         rows = sum(timing.stream.stamped for timing in judged)
-        if self.timed and self.clocks.timings and not self.clocks.received:
+        heard = any(self.concerns_sender(each.sender) for each in self.clocks.timings)
+        if self.timed and heard and not self.clocks.received:
             return Verdict(0, "the recording has no receive times that can be believed")
-        return Verdict(rows, self.undecided if self.clocks.timings and not rows else "")
+        return Verdict(rows, self.undecided if heard and not rows else "")
 
     def figures(self, observation: Observation) -> tuple[Figure, ...]:
         """Return how the clock of the stream, or else of its component, ran against receive time."""

@@ -282,7 +282,8 @@ class Rate(PoseCheck[_Beating]):
     def verdict(self) -> Verdict:
         """Return the rows of streams that go on for long enough."""
         least = self.params["min_live_s"] * 1e6
-        told = sum(found.rows for found in self._streams.values() if found.live_us >= least)
-        if self._streams and not told:
+        mine = [f for key, f in self._streams.items() if self.concerns_sender(key.sender)]
+        told = sum(found.rows for found in mine if found.live_us >= least)
+        if mine and not told:
             return Verdict(0, "no stream of poses goes on for long enough")
         return Verdict(told)

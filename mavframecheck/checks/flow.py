@@ -122,7 +122,8 @@ class Axes(Check):
 
     def verdict(self) -> Verdict:
         """Return the rows of sensors that turned about both axes."""
-        told = sum(sensor.rows for sensor in self._sensors.values() if self._turned(sensor))
-        if self._sensors and not told:
+        mine = [s for (_, sender, _), s in self._sensors.items() if self.concerns_sender(sender)]
+        told = sum(sensor.rows for sensor in mine if self._turned(sensor))
+        if mine and not told:
             return Verdict(0, "the sensor hardly turns about both of its axes")
         return Verdict(told)

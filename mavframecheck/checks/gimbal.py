@@ -152,7 +152,8 @@ class YawFrame(Check):
 
     def verdict(self) -> Verdict:
         """Return the reports of gimbals whose vehicle turned enough to tell."""
-        told = sum(gimbal.rows for gimbal in self._gimbals.values() if self._turned(gimbal))
-        if self._gimbals and not told:
+        mine = [g for (sender, *_), g in self._gimbals.items() if self.concerns_sender(sender)]
+        told = sum(gimbal.rows for gimbal in mine if self._turned(gimbal))
+        if mine and not told:
             return Verdict(0, "the vehicle hardly turns")
         return Verdict(told)

@@ -109,7 +109,8 @@ class NorthAsZero(Check):
 
     def verdict(self) -> Verdict:
         """Return the rows with a heading."""
-        return Verdict(sum(stream.given for stream in self._streams.values()))
+        mine = (s for (_, sender, _), s in self._streams.items() if self.concerns_sender(sender))
+        return Verdict(sum(stream.given for stream in mine))
 
 
 def _from_north(yaw_cdeg: int) -> int:

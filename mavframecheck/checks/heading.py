@@ -125,7 +125,8 @@ class Scale(Check):
 
     def verdict(self) -> Verdict:
         """Return the headings of vehicles that turned enough to tell."""
-        judged = sum(stream.rows for stream in self._streams.values() if self._moved(stream))
-        if self._streams and not judged:
+        mine = [s for (_, sender), s in self._streams.items() if self.concerns_sender(sender)]
+        judged = sum(stream.rows for stream in mine if self._moved(stream))
+        if mine and not judged:
             return Verdict(0, "insufficient motion: the vehicle hardly turned")
         return Verdict(judged)

@@ -238,7 +238,8 @@ class _Targets(Check):
         for message in TARGETS:
             table = batch.tables.get(message)
             for rows in () if table is None else _streams(table, context):
-                if rows.key in self._streams or len(self._streams) < MAX_STREAMS:
+                room = rows.key in self._streams or len(self._streams) < MAX_STREAMS
+                if room and self.concerns_sender(rows.key[0]):
                     places = context.registry.at(rows.key[1], rows.table.frames.number)
                     self.follow(rows, places, context)
 

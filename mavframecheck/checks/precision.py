@@ -101,6 +101,7 @@ class _Stream:
 
     subject: Subject
     role: str
+    sender: int
     runs: list[_Run] = field(default_factory=lambda: [_Run() for _ in _WAYS])
     found: list[tuple[int, _Run]] = field(default_factory=list)
     judged: int = 0
@@ -163,7 +164,7 @@ class Float32Passage(Check):
             frames, row = table.frames, int(rows[0])
             subject = Subject(int(frames.sysid[row]), int(frames.compid[row]), table.name)
             role = str(context.lookup("sender.role", table.take(rows[:1])).words[0])
-            stream = self._streams[key] = _Stream(subject, role)
+            stream = self._streams[key] = _Stream(subject, role, int(frames.sender[row]))
         return stream
 
     def _follow(self, stream: _Stream, table: Table, lat: FieldTag, lon: FieldTag) -> None:
@@ -206,10 +207,11 @@ class Float32Passage(Check):
 
     def verdict(self) -> Verdict:
         """Return the rows of streams that could be decided."""
-        decided = sum(s.judged for s in self._streams.values() if s.cleared or self._found(s))
-        if decided or not self._streams:
+        mine = [s for s in self._streams.values() if self.concerns_sender(s.sender)]
+        decided = sum(s.judged for s in mine if s.cleared or self._found(s))
+        if decided or not mine:
             return Verdict(decided)
-        if not any(s.judged for s in self._streams.values()):
+        if not any(s.judged for s in mine):
             return Verdict(0, "all positions lie within 8 degrees of the equator and Greenwich")
         return Verdict(0, "too few different positions to exclude chance")
 

@@ -113,7 +113,8 @@ class Orientation(Check):
 
     def verdict(self) -> Verdict:
         """Return the ranges of vehicles that climbed enough to tell."""
-        told = sum(sensor.rows for sensor in self._sensors.values() if self._climbed(sensor))
-        if self._sensors and not told:
+        mine = [s for (sender, *_), s in self._sensors.items() if self.concerns_sender(sender)]
+        told = sum(sensor.rows for sensor in mine if self._climbed(sensor))
+        if mine and not told:
             return Verdict(0, "the vehicle hardly climbs while its sensor has a range")
         return Verdict(told)

@@ -165,7 +165,8 @@ class SetpointCheck(Check):
         """Follow each stream through the batch."""
         self.learn(batch, context)
         for stream in streams(batch, context, self.messages):
-            if stream.key in self._subjects or len(self._subjects) < MAX_STREAMS:
+            room = stream.key in self._subjects or len(self._subjects) < MAX_STREAMS
+            if room and self.concerns_sender(stream.sender):
                 self._subjects[stream.key] = stream.subject
                 with np.errstate(all="ignore"):  # a setpoint may hold NaN and infinity
                     self.follow(stream)

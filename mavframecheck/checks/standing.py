@@ -44,6 +44,8 @@ class _Standing(Found):
     """How far it was away from there since."""
     way_m: float = 0.0
     """How far the vehicle went meanwhile, by the speed beside the position."""
+    image: int = 0
+    """Number of the first image with this position."""
 
 
 def _first_known(carried: float, values: Floats, start: Ints) -> Floats:
@@ -177,6 +179,36 @@ class FrozenFix(FrozenPose):
 
     def words(self, table: Table, row: int) -> dict[str, Scalar]:
         """Return the fix that stands."""
+        return {"lat": float(table["lat"][row] * 1e-7), "lon": float(table["lon"][row] * 1e-7)}
+
+
+class FrozenImages(FrozenPose):
+    """Images of a camera that were all taken at one place, to the last digit, while the vehicle goes somewhere else."""
+
+    messages = ("CAMERA_IMAGE_CAPTURED",)
+    autopilots = True
+
+    def counts(self, table: Table) -> Bools:
+        """Return (n,) the images with a place."""
+        return np.asarray((table["lat"] != 0) | (table["lon"] != 0))
+
+    def place_in(self, table: Table) -> Floats:
+        """Return (n, 2) latitude and longitude."""
+        return np.column_stack([table[name].astype(np.float64) for name in ("lat", "lon")])
+
+    def went(self, found: _Standing, table: Table, start: Ints, context: Context) -> Floats:
+        """Return (n,) how far the vehicle went since the first image of a place.
+
+        Nothing yet where there are few images since: a camera may be asked for one of them again.
+        """
+        away = super().went(found, table, start, context)
+        image = table["image_index"].astype(np.int64)
+        first = np.where(start < 0, found.image, image[np.maximum(start, 0)])
+        found.image = int(first[-1])
+        return np.where(image - first >= self.params["min_images"] - 1, away, 0.0)
+
+    def words(self, table: Table, row: int) -> dict[str, Scalar]:
+        """Return the place that stands."""
         return {"lat": float(table["lat"][row] * 1e-7), "lon": float(table["lon"][row] * 1e-7)}
 
 

@@ -17,7 +17,7 @@ from mavframecheck.model.integration import FileIntegration, Step, StepResult, V
 STEPS = (
     Step("axes", "does each axis hold what its label says?", ("MFC401", "MFC512")),
     Step("signs", "does each axis grow in the right direction?", ("MFC402", "MFC404")),
-    Step("scale", "metres, metres a second, radians?", ("MFC308", "MFC310", "MFC508")),
+    Step("scale", "metres, metres a second, radians?", ("MFC308", "MFC310", "MFC322", "MFC508")),
     Step(
         "rotation",
         "is it turned into the frame it names, and its attitude with it?",

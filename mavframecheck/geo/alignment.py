@@ -17,6 +17,11 @@ _ROUNDS = 5
 _HUBER = 2.5
 """Rows off by more than this many times the usual count less (P. Huber, 1964)."""
 
+_FIRM = 1e-9
+"""Unknowns that rows do not tell apart are held at nothing by this share of what they tell."""
+_LEAST_NOISE = 1e-3
+"""Nothing is measured better, m."""
+
 
 def yaw_between(source: npt.ArrayLike, target: npt.ArrayLike) -> float:
     """Return the turn about z, rad, that brings `source` nearest to `target`, both (n, 2 or 3)."""
@@ -78,6 +83,35 @@ def linear_between(source: Floats, target: Floats, independent: float) -> Linear
     size = float((weight * np.square(target).sum(axis=1)).sum() / total)
     error = noise / (np.maximum(moved, 1e-9) * np.sqrt(max(independent, 1.0)))
     return Linear(matrix, axes[:, ::-1], moved, error, 1 - noise**2 / size if size > 0 else 0.0)
+
+
+class Solution(NamedTuple):
+    """Unknowns of ``columns @ unknowns = target``, as the rows tell them."""
+
+    values: Floats
+    """(k,)."""
+    errors: Floats
+    """(k,) standard errors."""
+
+
+def robust_solution(columns: Floats, target: Floats, independent: float) -> Solution:
+    """Return the unknowns that bring (n, d, k) `columns` nearest to (n, d) `target`, robustly.
+
+    Of the n rows, that may overlap, only so many are `independent`: it sets the errors. Unknowns that the rows do not
+    tell apart have large ones.
+    """
+    weight = np.ones(len(target))
+    for _ in range(_ROUNDS):
+        moment = np.einsum("n,ndi,ndj->ij", weight, columns, columns)
+        inverse = np.linalg.inv(moment + _FIRM * np.diag(np.diagonal(moment) + 1.0))
+        values = inverse @ np.einsum("n,ndi,nd->i", weight, columns, target)
+        off = np.linalg.norm(target - columns @ values, axis=1)
+        usual = max(float(np.median(off)) * _HUBER, 1e-9)
+        weight = np.minimum(1.0, usual / np.maximum(off, 1e-12))
+    total = float(weight.sum())
+    noise = max(float((weight * off**2).sum() / total) / target.shape[1], _LEAST_NOISE**2)
+    share = max(total / max(independent, 1.0), 1.0)
+    return Solution(values, np.sqrt(np.diagonal(inverse) * noise * share))
 
 
 def trimmed_rms(off: Floats, share: float = 0.9) -> float:

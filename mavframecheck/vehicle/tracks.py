@@ -7,6 +7,7 @@ where batches are cut. Samples with receive times that cannot be believed, or th
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -14,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.semantics import catalogue
+from mavframecheck.semantics.tags import FieldTag
 from mavframecheck.wire import Batch, Place, Table
 
 Ints = npt.NDArray[np.int64]
@@ -100,6 +103,24 @@ def _blowing(table: Table) -> Floats:
     return np.column_stack((speed * np.cos(towards), speed * np.sin(towards), table["speed_z"]))
 
 
+def _mount_heading(table: Table) -> Floats:
+    """Return (n, 3) what MOUNT_ORIENTATION makes of the heading of its vehicle: one yaw less the other, rad."""
+    yaw, absolute = (table[name].astype(np.float64) for name in ("yaw", "yaw_absolute"))
+    said = table.present("yaw_absolute") & np.isfinite(yaw) & np.isfinite(absolute)
+    return _only_yaw(np.radians(np.where(said, absolute, np.nan) - np.where(said, yaw, 0.0)))
+
+
+def _delta_heading(table: Table) -> Floats:
+    """Return (n, 3) the heading of its vehicle that a gimbal says beside its pose, rad; 0 is not filled in."""
+    heading = table["delta_yaw"].astype(np.float64)
+    return _only_yaw(np.where(table.present("delta_yaw") & (heading != 0), heading, np.nan))
+
+
+def _only_yaw(yaw: Floats) -> Floats:
+    level = np.where(np.isfinite(yaw), 0.0, np.nan)
+    return np.column_stack((level, level, yaw))
+
+
 _XYZ = _fields("x", "y", "z")
 _VXYZ = _fields("vx", "vy", "vz")
 _RPY = _fields("roll", "pitch", "yaw")
@@ -111,7 +132,10 @@ _USEC = _fields("usec", scale=1e-6)
 _TIME_USEC = _fields("time_usec", scale=1e-6)
 _BOOT_MS = _fields("time_boot_ms", scale=1e-3)
 
-SOURCES: dict[str, Source] = {
+NO_RATES = ("RAW_IMU", "SET_ATTITUDE_TARGET", "ATTITUDE_TARGET", "MANUAL_SETPOINT")
+"""Rates without a unit, and rates that are asked for."""
+
+_SOURCES: dict[str, Source] = {
     "GLOBAL_POSITION_INT": Source(
         place=_geodetic("lat", "lon", "alt"),
         velocity=_fields("vx", "vy", "vz", scale=1e-2),
@@ -142,6 +166,13 @@ SOURCES: dict[str, Source] = {
         valid=lambda table: np.asarray(table["type_mask"] & _ATTITUDE_IGNORED == 0),
         variant=("target_system", "type_mask"),
     ),
+    "AUTOPILOT_STATE_FOR_GIMBAL_DEVICE": Source(
+        attitude=_array("q"), stamp=_fields("time_boot_us", scale=1e-6)
+    ),
+    "GIMBAL_DEVICE_ATTITUDE_STATUS": Source(
+        attitude=_delta_heading, stamp=_BOOT_MS, euler=True, variant=("gimbal_device_id",)
+    ),
+    "MOUNT_ORIENTATION": Source(attitude=_mount_heading, stamp=_BOOT_MS, euler=True),
     "VISION_SPEED_ESTIMATE": Source(velocity=_XYZ, stamp=_USEC),
     "ATT_POS_MOCAP": Source(place=_XYZ, attitude=_array("q"), stamp=_TIME_USEC),
     "ODOMETRY": Source(
@@ -170,7 +201,43 @@ SOURCES: dict[str, Source] = {
         variant=("id",),
     ),
 }
-"""Messages that are followed."""
+
+
+def _rates_by_tag() -> Iterator[tuple[str, Source]]:
+    """Yield every message that measures the turning of a body, by its tags, and how it says it."""
+    for first in catalogue.find(quantity="angular_rate", axis="forward"):
+        found = catalogue.partners(first)
+        rates = [found.get(name) for name in ("rollspeed", "pitchspeed", "yawspeed")]
+        if first.message not in NO_RATES and all(rates) and rates[0] is first:
+            known = _SOURCES.get(first.message, Source(variant=_instance(first)))
+            tags = [tag for tag in rates if tag is not None]
+            yield first.message, known._replace(rates=_by_tags(tags))
+
+
+def _instance(tag: FieldTag) -> tuple[str, ...]:
+    return (tag.instance_field,) if tag.instance_field else ()
+
+
+def _by_tags(tags: list[FieldTag]) -> Reader:
+    """Return what reads (n, 3) the fields of three tags in SI, NaN where a mask says that they are not given."""
+
+    def read(table: Table) -> Floats:
+        values: Floats = np.column_stack(
+            [table[t.field].astype(np.float64) * t.scale for t in tags]
+        )
+        for column, tag in enumerate(tags):
+            if tag.ignore_field:
+                is_set = table[tag.ignore_field].astype(np.int64) & tag.ignore_bit != 0
+                values[is_set == tag.ignore_when_set, column] = np.nan
+        return values
+
+    return read
+
+
+@functools.cache
+def sources() -> dict[str, Source]:
+    """Return the messages that are followed."""
+    return _SOURCES | dict(_rates_by_tag())
 
 
 class TrackKey(NamedTuple):
@@ -273,9 +340,9 @@ class Tracks:
         if self.t0_us is None and frames.t_valid.any():
             self.t0_us = int(frames.t_us[np.argmax(frames.t_valid)])
             self.timed = True
-        for name in batch.tables.keys() & SOURCES.keys():
+        for name in batch.tables.keys() & sources().keys():
             table = batch.tables[name]
-            source = SOURCES[name]
+            source = sources()[name]
             good = table.frames.t_valid & (table.frames.t_us >= table.frames.clock_us - LATE_US)
             if source.valid is not None:
                 good &= source.valid(table)
@@ -288,7 +355,7 @@ class Tracks:
             if len(self.tracks) >= MAX_TRACKS:
                 return
             at = table.frames.place(0)
-            track = self.tracks[key] = Track(key, SOURCES[key.message], at, at)
+            track = self.tracks[key] = Track(key, sources()[key.message], at, at)
         since = table.frames.t_us - (self.t0_us or 0)
         bins = np.maximum(since // BIN_US, 0)
         while int(bins.max()) // WINDOW_BINS >> self._level >= MAX_WINDOWS:

@@ -29,10 +29,13 @@ def flight(seconds: float = 40.0, shift_s: float = 0.0) -> Series:
     return Series("GLOBAL_POSITION_INT", t, place, lies, velocity, t)
 
 
+Fields = Callable[[Series, int], dict[str, Any]]
+
+
 def recording(
-    message: str, fields: Callable[[Series, int], dict[str, Any]], seconds: float = 40.0
+    message: str, fields: Fields, seconds: float = 40.0, second: Fields | None = None
 ) -> bytes:
-    """Return the flight as telemetry, and a stream of `message` that a companion sends beside it."""
+    """Return the flight as telemetry, and a stream of `message` that a companion sends beside it, or two do."""
     true = flight(seconds)
     data = b""
     angles = q4.euler_from_quaternion(true.attitude)
@@ -57,6 +60,8 @@ def recording(
             frame("ATTITUDE", lies | boot),
             frame(message, fields(true, k), (1, 191)),
         ]
+        if second is not None:
+            frames.append(frame(message, second(true, k), (1, 192)))
         if k % 10 == 0:
             frames.append(frame("HEARTBEAT", {"type": 2, "autopilot": 3}))
         for each in frames:

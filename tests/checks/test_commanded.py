@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mavframecheck.checks.motion import response
+from mavframecheck.checks.motion import Response, response
 from mavframecheck.checks.motion.holds import Hold
 from mavframecheck.checks.motion.response import Answer, Motion, Sample
 from mavframecheck.engine import Pack
@@ -137,3 +137,23 @@ def test_without_the_mode_nothing_is_told() -> None:
     result = judge(silent, pack=Pack((rule,), {"MFC417": "here"}))
     assert not result[1]
     assert run_of(result, "MFC417").status == "insufficient-data"
+
+
+def test_a_yaw_that_is_not_followed_is_no_pass() -> None:
+    """There may be good reasons; so nothing is found, and it is said that nothing was told."""
+    asked, done = (0.0, 1.5, 3.0, -1.5), (0.7, 0.1, -2.0, 2.4)
+    pairs = zip(asked, done, strict=True)
+    found = [Sample("yaw", np.array([a]), np.array([d]), HOLD) for a, d in pairs]
+    answer = response.of_yaw(found)
+    assert isinstance(answer, Answer)
+    assert answer.kind == "undecided"
+    check = Response(rule_named("MFC417").params, DIALECT)
+    check._holds.senders.add(HOLD.sender)
+    check._told = [(found, "yaw", answer)]
+    assert not list(check.finish())
+    assert check.verdict().checked == 0
+    assert "yaw: the vehicle does not follow it" in check.verdict().insufficient
+    right = [Sample("yaw", np.array([a]), np.array([a]), HOLD) for a in asked]
+    check._told.append((right, "yaw", response.of_yaw(right)))
+    assert check.verdict().checked
+    assert "does not follow" in check.verdict().partly

@@ -323,3 +323,20 @@ def test_insufficient() -> None:
 def test_cuts(cuts: list[int]) -> None:
     """Findings do not depend on batches."""
     assert judge(WRONG, cuts, PACK)[1] == judge(WRONG, pack=PACK)[1]
+
+
+@pytest.mark.parametrize("turning", [0.0, 1.0])
+def test_front_left_up_or_north_west_up(turning: float) -> None:
+    """On the way north both are one, and neither is said; with turns it is the body's."""
+    yaw = q4.quaternion_from_euler(0, 0, turning * 1.5 * np.sin(0.4 * TRUE.t))
+    true = dataclasses.replace(TRUE, attitude=yaw)
+    given = q4.turn_by(q4.inverse(yaw), true.velocity) * [1, -1, -1]
+    stream = dataclasses.replace(true, velocity=given)
+    found = twist.compare(stream, true, true, body=False, yaw=0.0, delay_s=0.0, rate=1.0)
+    if turning:
+        assert isinstance(found, twist.Twist)
+        assert found.kind == "flu"
+    else:
+        assert isinstance(found, str)
+        assert "front-left-up" in found
+        assert "north-west-up" in found

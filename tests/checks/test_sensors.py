@@ -19,7 +19,7 @@ from tests.checks.rule_bench import chopped, pack_of_files, rule_named
 from tests.engine.judged import judge, run_of
 from tests.strategies import DIALECT, MESSAGES, START_US, frame, packed, shape
 
-CODES = ("MFC122", "MFC319", "MFC320", "MFC414", "MFC415", "MFC510", "MFC612")
+CODES = ("MFC122", "MFC418", "MFC419", "MFC319", "MFC320", "MFC414", "MFC415", "MFC510", "MFC612")
 
 
 @pytest.mark.parametrize("code", CODES)
@@ -52,6 +52,7 @@ ALL = (
     "MFC412",
     "MFC413",
     "MFC417",
+    "MFC322",
     "MFC420",
     "MFC512",
     "MFC609",

@@ -1,7 +1,7 @@
 """Which way the axes really point: what streams say of motion, beside the motion there was.
 
 `judge` listens and compares, `axes` tells where the axes of a position or velocity point, `attitude` and
-`twist` how a rotation and a velocity are to be read, `checks` are the rules. `holds` and `response` put what was
+`twist` how a rotation and a velocity are to be read, `lever` how far beside the vehicle a stream measures, `checks` are the rules. `holds` and `response` put what was
 asked for beside what was done; `commanded` has the rules on that.
 """
 
@@ -9,6 +9,7 @@ from mavframecheck.checks.motion.checks import (
     BodyAxes,
     EstimateScale,
     EulerSwapped,
+    LeverArm,
     LocalAxes,
     PoseRotation,
     QuarterTurn,
@@ -21,7 +22,9 @@ from mavframecheck.checks.motion.checks import (
     YawSign,
 )
 from mavframecheck.checks.motion.commanded import AttitudeFrame, Response
+from mavframecheck.checks.motion.gyros import Units
 from mavframecheck.checks.motion.representations import Representations
+from mavframecheck.checks.motion.stale import StalePose
 from mavframecheck.checks.motion.wind import WindDirection
 
 __all__ = [
@@ -29,6 +32,7 @@ __all__ = [
     "BodyAxes",
     "EstimateScale",
     "EulerSwapped",
+    "LeverArm",
     "LocalAxes",
     "PoseRotation",
     "QuarterTurn",
@@ -37,7 +41,9 @@ __all__ = [
     "Response",
     "SensorMount",
     "SpeedFrame",
+    "StalePose",
     "Unaligned",
+    "Units",
     "VectorFrame",
     "Vertical",
     "WindDirection",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mavframecheck.checks.base import Check, Observation, Verdict
-from mavframecheck.checks.motion import attitude, axes, twist
+from mavframecheck.checks.motion import attitude, axes, lever, twist
 from mavframecheck.checks.motion import judge as judging
 from mavframecheck.checks.motion.setpoints import OrderOfSetpoints
 from mavframecheck.model import Scalar
@@ -99,6 +99,8 @@ class MotionCheck(Check):
 
 def _about(told: Mapping[str, Scalar]) -> str:
     """Return which conclusion about a stream the values of a finding are from."""
+    if told.get("what") == "lever arm":
+        return "lever"
     if told.get("measured_in") == "m":
         return "speed" if told.get("what") == "velocity" else "place"
     return "lie" if told.get("measured_in") == "degrees" else "twist"
@@ -476,7 +478,7 @@ class SpeedFrame(VectorFrame):
     """Velocities from vision that are in the axes of the body."""
 
     message = "VISION_SPEED_ESTIMATE"
-    right = ("labelled", "inverse", "enu")
+    right = ("labelled", "inverse", "enu", "nwu")
 
 
 class EstimateScale(MotionCheck):
@@ -510,6 +512,44 @@ class EstimateScale(MotionCheck):
         limit = 1 + self.params["tolerance"]
         wrong = fit.scale > limit or fit.scale < 1 / limit
         return fit_values(fit) if wrong else None
+
+
+class LeverArm(_Concluding):
+    """Positions of a sensor beside the vehicle's point of reference, as if they were that point's."""
+
+    aspects = ("lever",)
+
+    def why_not(self, subject: judging.Subject) -> str:
+        """Return what was missing to tell: silence counts where a short arm would have shown."""
+        arm = subject.lever
+        if isinstance(arm, str):
+            return arm
+        if self._long(arm):
+            return ""
+        if arm.shows_m > self.params["shows_m"]:
+            return f"only an arm longer than {arm.shows_m:.2f} m would show"
+        fed = self._judge is not None and self._judge.may_feed(subject)
+        return "the vehicle's own position may be made from it" if fed else ""
+
+    def _long(self, arm: lever.Lever) -> bool:
+        return arm.there and arm.length_m >= self.params["min_arm_m"]
+
+    def told(self, subject: judging.Subject) -> Values | None:
+        """Return the arm."""
+        arm = subject.lever
+        if isinstance(arm, str) or not self._long(arm):
+            return None
+        return {
+            "what": "lever arm",
+            "says": arm.says,
+            "arm_m": arm.length_m,
+            "error_m": arm.error_m,
+            "left": arm.left_m,
+            "labelled": arm.labelled_m,
+            "measured_in": "m",
+            "span_s": lever.SPAN_S,
+            "seconds": arm.seconds,
+        }
 
 
 def _step_m(fit: axes.Fit) -> float:

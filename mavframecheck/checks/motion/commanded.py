@@ -76,15 +76,15 @@ class Response(Check):
 
     def verdict(self) -> Verdict:
         """Return the setpoints that could be compared, or what was missing."""
-        if not self._holds.rows:
+        if not any(self.concerns_sender(sender) for sender in self._holds.senders):
             return Verdict(0)
-        told = [found for found, _, answer in self._answers() if isinstance(answer, Answer)]
-        if told:
-            return Verdict(sum(each.hold.rows for found in told for each in found))
-        reasons = {f"{what}: {answer}" for _, what, answer in self._answers()}
-        return Verdict(
-            0, "; ".join(sorted(reasons)) or "no setpoint was held while the vehicle obeyed"
-        )
+        answers = self._answers()
+        told = [found for found, _, answer in answers if not _undecided(answer)]
+        rows = sum(each.hold.rows for found in told for each in found)
+        if rows:
+            lost = [each for each in answers if isinstance(each[2], Answer)]
+            return Verdict(rows, partly=_reasons(lost))
+        return Verdict(0, _reasons(answers) or "no setpoint was held while the vehicle obeyed")
 
     def _answers(self) -> list[tuple[list[Sample], str, Answer | str]]:
         if self._told is None:
@@ -93,7 +93,8 @@ class Response(Check):
 
     def _compared(self) -> Iterator[tuple[list[Sample], str, Answer | str]]:
         kinds: dict[tuple[int, int], dict[str, list[Sample]]] = {}
-        for hold in self._holds.finish():
+        mine = (each for each in self._holds.finish() if self.concerns_sender(each.sender))
+        for hold in mine:
             motion = self._motion(hold.system)
             for sample in response.samples(hold, motion) if motion is not None else ():
                 of = kinds.setdefault((hold.sender, hold.system), {})
@@ -113,6 +114,25 @@ class Response(Check):
         return Motion(
             judge.series(place), attitudes, 1.0 if attitudes is None else rate_of(attitudes)
         )
+
+
+def _undecided(answer: Answer | str) -> str:
+    """Return why an answer tells nothing; nothing where it does.
+
+    A vehicle that does not follow at all may have its reasons: an option that gives the yaw to the way it flies or to a
+    region of interest, a limit, an obstacle. That is no matter of frames.
+    """
+    if isinstance(answer, str):
+        return answer
+    if answer.kind != "undecided":
+        return ""
+    return "the vehicle does not follow it, neither turned nor reversed: something else may decide"
+
+
+def _reasons(answers: list[tuple[list[Sample], str, Answer | str]]) -> str:
+    """Return for each kind of setpoint that tells nothing why."""
+    reasons = {f"{what}: {why}" for _, what, answer in answers if (why := _undecided(answer))}
+    return "; ".join(sorted(reasons))
 
 
 def _of_stream(kinds: dict[str, list[Sample]]) -> Iterator[tuple[list[Sample], str, Answer | str]]:
@@ -177,7 +197,8 @@ class AttitudeFrame(Check):
     def _lies(self) -> list[tuple[Track, attitude.Lie | str]]:
         if self._told is None and self._judge is not None:
             tracks = self._judge.tracks_of("SET_ATTITUDE_TARGET")
-            self._told = [(track, _lie(track, self._judge)) for track in tracks]
+            mine = [track for track in tracks if self.concerns_sender(track.key.sender)]
+            self._told = [(track, _lie(track, self._judge)) for track in mine]
         return self._told or []
 
 

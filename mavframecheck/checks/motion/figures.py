@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.motion import attitude, axes, twist
+from mavframecheck.checks.motion import attitude, axes, lever, twist
 from mavframecheck.checks.motion.series import APART_M, Series, thinned
 from mavframecheck.geo import quaternions as q4
 from mavframecheck.geo.rotations import wrapped_deg
@@ -87,6 +87,18 @@ def of_twist(
             _line(f"if {turn.says}", "corrected", t, read.by_name[turn.kind][:, column]),
         )
         yield Figure(title=f"Velocity {name}", kind="time", unit="m/s", traces=traces)
+
+
+def of_lever(steps: lever.Steps, reference: str, t0_s: float) -> Iterator[Figure]:
+    """Yield how much further than the vehicle a stream goes, and what of it an arm explains."""
+    t, said = steps.at + t0_s, steps.columns @ steps.solved().values
+    for column, name in enumerate(("north", "east")):
+        traces = (
+            _line(f"further than {reference}", "claimed", t, steps.further[:, column]),
+            _line("what the arm makes of it", "corrected", t, said[:, column]),
+        )
+        title = f"Way over {lever.SPAN_S:.0f} s, {name}"
+        yield Figure(title=title, kind="time", unit="m", traces=traces)
 
 
 def _together(place: Floats) -> Floats:

@@ -56,8 +56,8 @@ class Holds:
     def __init__(self) -> None:
         """Know nothing yet."""
         self.kept: list[Hold] = []
-        self.rows = 0
-        """Setpoints looked at."""
+        self.senders: set[int] = set()
+        """Who sent setpoints."""
         self._open: dict[tuple[int, int, str], Hold] = {}
         """The last setpoint of each stream: sender, system and message."""
         self._interruptions: list[tuple[float, int]] = []
@@ -74,7 +74,8 @@ class Holds:
             table = stream.table.take(stream.table.frames.t_valid)
             if len(table):
                 system = int(context.about(table)[0])
-                self.rows += len(table)
+                if len(self.senders) < MAX_STREAMS:
+                    self.senders.add(stream.sender)
                 found += _holds(stream._replace(table=table), system, t0_us)
         for hold in sorted(found, key=lambda each: each.first.number):
             self._add(hold)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.checks.motion import attitude as attitudes
-from mavframecheck.checks.motion import axes, twist
+from mavframecheck.checks.motion import axes, lever, twist
 from mavframecheck.checks.motion.series import Series, series_of
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
@@ -43,7 +43,12 @@ VELOCITIES = (
     "GLOBAL_POSITION_INT",
     "LOCAL_POSITION_NED",
 )
-_PARAMETERS = (b"EK3_SRC1_POSXY", b"EK3_SRC1_POSZ", b"EK3_SRC1_YAW", b"EKF2_EV_CTRL", b"VISO_TYPE")
+_OFFSETS = (b"VISO_POS_X", b"VISO_POS_Y", b"EKF2_EV_POS_X", b"EKF2_EV_POS_Y")
+"""Where autopilots are told that the sensor sits, m: they take it into account."""
+_PARAMETERS = (
+    *(b"EK3_SRC1_POSXY", b"EK3_SRC1_POSZ", b"EK3_SRC1_YAW", b"EKF2_EV_CTRL", b"VISO_TYPE"),
+    *_OFFSETS,
+)
 _ALIGNING = (2, 3)
 """VISO_TYPE of cameras whose heading ArduPilot aligns itself."""
 _EXTERNAL = 6
@@ -85,6 +90,8 @@ class Subject(NamedTuple):
     twist: twist.Twist | str
     speed: axes.Fit | str
     """Its velocity, added up, where that is labelled as of the world."""
+    lever: lever.Lever | str
+    """How far beside the vehicle's point of reference it measures."""
 
 
 class _Truth(NamedTuple):
@@ -156,18 +163,24 @@ class Judge:
         return self._tracks.timed
 
     def figures(self, subject: Subject, about: str) -> tuple[Figure, ...]:
-        """Return what proves the conclusion about the ``place``, ``speed``, ``lie`` or ``twist`` of a stream."""
+        """Return what proves a conclusion about a stream: ``place``, ``speed``, ``lie``, ``twist``, ``lever``."""
         from mavframecheck.checks.motion import figures
 
         stream, truth = self.series(subject.track), self._truth(subject.system, subject.track)
         told, t0_s = getattr(subject, about), (self._tracks.t0_us or 0) * 1e-6
-        if isinstance(told, axes.Fit) and truth.place is not None:
+        place, lies = truth.place, truth.attitude
+        if isinstance(told, axes.Fit) and place is not None:
             moved = stream.integrated(truth.rate) if about == "speed" else stream
-            return tuple(figures.of_axes(told, subject.frame, moved, truth.place, t0_s))
-        if isinstance(told, attitudes.Lie) and truth.attitude is not None:
-            return tuple(figures.of_attitude(told, stream, truth.attitude, t0_s))
-        if isinstance(told, twist.Twist) and truth.place is not None and truth.attitude is not None:
-            return tuple(figures.of_twist(told, stream, truth.place, truth.attitude, t0_s))
+            return tuple(figures.of_axes(told, subject.frame, moved, place, t0_s))
+        if isinstance(told, attitudes.Lie) and lies is not None:
+            return tuple(figures.of_attitude(told, stream, lies, t0_s))
+        if place is None or lies is None:
+            return ()
+        if isinstance(told, twist.Twist):
+            return tuple(figures.of_twist(told, stream, place, lies, t0_s))
+        if isinstance(told, lever.Lever) and isinstance(subject.place, axes.Fit):
+            steps = lever.steps_of(stream, place, lies, subject.place)
+            return tuple(figures.of_lever(steps, place.message, t0_s))
         return ()
 
     @functools.cached_property
@@ -179,12 +192,12 @@ class Judge:
         for track in list(self._tracks.tracks.values()):
             asked = self.only in (None, track.key.sender)
             if asked and track.key.message in (*POSES, *VELOCITIES):
-                system = self._about(track.key.sender)
+                system = self.about(track.key.sender)
                 own = self._roles[track.key.sender] == "autopilot"
                 if not (own and track.key.message == "ODOMETRY"):
                     yield self._subject(track, system, own=own)
 
-    def _about(self, sender: int) -> int:
+    def about(self, sender: int) -> int:
         """Return the system a sender speaks of: its own, else the only one with an autopilot."""
         systems = {each >> 8 for each, role in self._roles.items() if role == "autopilot"}
         if sender >> 8 in systems:
@@ -196,13 +209,17 @@ class Judge:
         frame = self._frame_of(track, system)
         if frame is None:
             why = "its frame has no axes that could be compared"
-            return Subject(track, system, own, axes.NED, "", why, why, why, why)
+            return Subject(track, system, own, axes.NED, "", why, why, why, why, why)
         truth = self._truth(system, track)
         stream = self.series(track)
         reference = truth.place.message if truth.place is not None else ""
-        judged = Subject(track, system, own, frame, reference, nothing, nothing, nothing, nothing)
+        judged = Subject(
+            track, system, own, frame, reference, nothing, nothing, nothing, nothing, nothing
+        )
         if track.key.message in POSES:
             judged = judged._replace(place=self._place(stream, truth, frame))
+            if not own:
+                judged = judged._replace(lever=self._lever(stream, truth, judged))
         if track.source.attitude is not None and not own:
             judged = judged._replace(lie=self._lie(stream, truth, judged))
         if track.source.velocity is not None and track.key.message != "ODOMETRY":
@@ -293,6 +310,10 @@ class Judge:
             "simulator tells where it was"
         )
 
+    def may_feed(self, subject: Subject) -> bool:
+        """Return whether what a stream was compared with may be made from it, and shows only a part of what it shows."""
+        return subject.reference == "GLOBAL_POSITION_INT" and self._fed(subject.system)
+
     def _fed(self, system: int) -> bool:
         """Return whether the estimator of a vehicle may be fed by external poses; yes where unknown."""
         sources = [self.parameters.get((system, n)) for n in (b"EK3_SRC1_POSXY", b"EK3_SRC1_POSZ")]
@@ -306,6 +327,18 @@ class Judge:
             return truth.why
         fit = axes.compare(stream, truth.place, frame)
         return fit.why if isinstance(fit, axes.Undecided) else fit
+
+    def _lever(self, stream: Series, truth: _Truth, judged: Subject) -> lever.Lever | str:
+        fit = judged.place
+        if isinstance(fit, str):
+            return fit
+        if truth.place is None or truth.attitude is None:
+            return "no ATTITUDE of the vehicle"
+        if fit.kind != "agrees":
+            return "its axes are not those that it names"
+        if any(self.parameters.get((judged.system, name)) for name in _OFFSETS):
+            return "the autopilot is told where the sensor sits"
+        return lever.compare(stream, truth.place, truth.attitude, fit)
 
     def _speed(self, stream: Series, truth: _Truth, frame: axes.Frame) -> axes.Fit | str:
         if truth.place is None:

@@ -88,7 +88,8 @@ class Representations(Check):
         if self._told is None and self._judge is not None:
             judge = self._judge
             tracks = [track for message in MESSAGES for track in judge.tracks_of(message)]
-            own = [track for track in tracks if judge.role(track.key.sender) == "autopilot"]
+            mine = [track for track in tracks if self.concerns_sender(track.key.sender)]
+            own = [track for track in mine if judge.role(track.key.sender) == "autopilot"]
             self._told = [(track, self._compare(judge, track)) for track in own]
         return self._told or []
 

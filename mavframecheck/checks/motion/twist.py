@@ -20,6 +20,8 @@ MIN_MPS = 0.5
 MIN_TELLING = 30
 """Moments, a tenth of a second apart, at which the two readings differ by that much."""
 CLEARLY = 0.35
+ALIKE = 0.15
+"""Readings of which neither leaves more than this share of the speed, or twice what the other does, are not told apart."""
 FITS = 0.35
 """Share of the speed that the right reading may leave."""
 
@@ -31,7 +33,7 @@ class Twist(NamedTuple):
     """How a velocity is to be read."""
 
     kind: str
-    """``labelled``, ``world``, ``body``, ``level``, ``inverse``, ``flu`` or ``enu``."""
+    """``labelled``, ``world``, ``body``, ``level``, ``inverse``, ``flu``, ``enu`` or ``nwu``."""
     says: str
     left_mps: float
     labelled_mps: float
@@ -64,7 +66,10 @@ _SAYS = {
     "inverse": "the velocity was turned the wrong way (from the body to the world twice over)",
     "flu": "the velocity is in front-left-up axes",
     "enu": "the velocity is in east-north-up axes",
+    "nwu": "the velocity is in north-west-up axes",
 }
+_OF_BODY = ("body", "level", "flu")
+"""Readings that turn with the vehicle; the others belong to the world, and to other rules."""
 
 
 def compare(
@@ -114,6 +119,7 @@ def readings(
         "inverse": q4.turn_by(q4.inverse(r), v),
         "flu": q4.turn_by(r, v @ _FLU),
         "enu": v @ _ENU.T,
+        "nwu": v @ _FLU,
     }
     times = (float(at[0]), float(at[-1])) if len(at) else (0.0, 0.0)
     return Readings(at[fine], by_name, t, times)
@@ -132,7 +138,8 @@ def _choose(
     speed = float(np.sqrt(np.mean(np.square(true).sum(axis=1))))
     off = {name: np.linalg.norm(v - true, axis=1) for name, v in readings.items()}
     left = {name: trimmed_rms(each, 0.95) for name, each in off.items()}
-    best = min(left, key=lambda name: left[name])
+    meant = [name for name in left if label == "world" or name != "nwu"]
+    best = min(meant, key=lambda name: left[name])
     same = (label, "level") if label == "body" else (label,)  # axes of the heading are of the body
     fine = any(left[name] < max(FITS * speed, 1.2 * left[best]) for name in same[1:])
     told = frozenset(
@@ -147,7 +154,12 @@ def _choose(
         return "the vehicle points along the axes of the world"
     if left[best] > CLEARLY * left[label]:
         return "the velocity follows the vehicle in no axes"
-    return Twist(best, _SAYS[best], left[best], left[label], len(true) * GRID_S, times, told)
+    alike = [name for name in left if left[name] <= max(2 * left[best], ALIKE * speed)]
+    words = list(dict.fromkeys(_SAYS[name] for name in sorted(alike, key=lambda n: left[n])))
+    if len({name in _OF_BODY for name in alike}) > 1:
+        return f"on the way that was flown two readings are one: {', or '.join(words)}"
+    says = ", or ".join(words)
+    return Twist(best, says, left[best], left[label], len(true) * GRID_S, times, told)
 
 
 def _differ(reading: Floats, label: Floats, least: float) -> bool:

@@ -89,7 +89,8 @@ class WindDirection(Check):
         if self._told is None and self._judge is not None:
             judge = self._judge
             tracks = [track for message in MESSAGES for track in judge.tracks_of(message)]
-            self._told = [(track, list(_told(judge, track, self.params))) for track in tracks]
+            mine = [track for track in tracks if self.concerns_sender(track.key.sender)]
+            self._told = [(track, list(_told(judge, track, self.params))) for track in mine]
         return self._told or []
 
 
