@@ -84,7 +84,7 @@ def of_twist(
         traces = (
             _line(place.message, "reference", t, read.true[:, column]),
             _line("as labelled", "claimed", t, read.by_name[turn.label][:, column]),
-            _line(f"if {turn.says}", "corrected", t, read.by_name[turn.kind][:, column]),
+            _line(f"if {turn.says}", "corrected", t, read.by_name[turn.reading][:, column]),
         )
         yield Figure(title=f"Velocity {name}", kind="time", unit="m/s", traces=traces)
 

@@ -32,8 +32,8 @@ _ENU: Floats = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])
 class Twist(NamedTuple):
     """How a velocity is to be read."""
 
-    kind: str
-    """``labelled``, ``world``, ``body``, ``level``, ``inverse``, ``flu``, ``enu`` or ``nwu``."""
+    reading: str
+    """``labelled``, or one of `Readings`."""
     says: str
     left_mps: float
     labelled_mps: float
@@ -47,6 +47,11 @@ class Twist(NamedTuple):
     delay_s: float = 0.0
     rate: float = 1.0
     """What it was compared with: see `compare`."""
+
+    @property
+    def kind(self) -> str:
+        """Return ``labelled``, ``world``, ``body``, ``level``, ``inverse``, ``flu``, ``enu`` or ``nwu``."""
+        return "flu" if self.reading == "level flu" else self.reading
 
 
 class Readings(NamedTuple):
@@ -65,10 +70,11 @@ _SAYS = {
     "level": "the velocity is in the axes of the body",
     "inverse": "the velocity was turned the wrong way (from the body to the world twice over)",
     "flu": "the velocity is in front-left-up axes",
+    "level flu": "the velocity is in front-left-up axes",
     "enu": "the velocity is in east-north-up axes",
     "nwu": "the velocity is in north-west-up axes",
 }
-_OF_BODY = ("body", "level", "flu")
+_OF_BODY = ("body", "level", "flu", "level flu")
 """Readings that turn with the vehicle; the others belong to the world, and to other rules."""
 
 
@@ -112,12 +118,14 @@ def readings(
     scale = float(np.linalg.norm(v) / np.linalg.norm(t)) if len(t) else 0.0
     v = v / scale if scale > 0 else v
     world = yaw_matrix(-yaw)
+    heading = q4.about_z(q4.euler_from_quaternion(r)[:, 2])
     by_name = {
         "body": q4.turn_by(r, v),
         "world": v @ world.T,
-        "level": q4.turn_by(q4.about_z(q4.euler_from_quaternion(r)[:, 2]), v),
+        "level": q4.turn_by(heading, v),
         "inverse": q4.turn_by(q4.inverse(r), v),
         "flu": q4.turn_by(r, v @ _FLU),
+        "level flu": q4.turn_by(heading, v @ _FLU),
         "enu": v @ _ENU.T,
         "nwu": v @ _FLU,
     }
@@ -156,9 +164,10 @@ def _choose(
         return "the velocity follows the vehicle in no axes"
     alike = [name for name in left if left[name] <= max(2 * left[best], ALIKE * speed)]
     words = list(dict.fromkeys(_SAYS[name] for name in sorted(alike, key=lambda n: left[n])))
-    if len({name in _OF_BODY for name in alike}) > 1:
-        return f"on the way that was flown two readings are one: {', or '.join(words)}"
-    says = ", or ".join(words)
+    says = ", or ".join((words[0], *(each.removeprefix("the velocity is ") for each in words[1:])))
+    # A label of the body is wrong by any of them; one of the world by another rule for each.
+    if label == "world" and len({name in _OF_BODY for name in alike}) > 1:
+        return f"on the way that was flown two readings are one: {says}"
     return Twist(best, says, left[best], left[label], len(true) * GRID_S, times, told)
 
 
