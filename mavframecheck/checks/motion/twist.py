@@ -117,13 +117,13 @@ def readings(
     v, r, t = given[fine], lies[fine], true[fine]
     scale = float(np.linalg.norm(v) / np.linalg.norm(t)) if len(t) else 0.0
     v = v / scale if scale > 0 else v
-    world = yaw_matrix(-yaw)
+    world = v @ yaw_matrix(-yaw).T
     heading = q4.about_z(q4.euler_from_quaternion(r)[:, 2])
     by_name = {
         "body": q4.turn_by(r, v),
-        "world": v @ world.T,
+        "world": world,
         "level": q4.turn_by(heading, v),
-        "inverse": q4.turn_by(q4.inverse(r), v),
+        "inverse": q4.turn_by(q4.inverse(r), world) @ yaw_matrix(-yaw).T,
         "flu": q4.turn_by(r, v @ _FLU),
         "level flu": q4.turn_by(heading, v @ _FLU),
         "enu": v @ _ENU.T,
