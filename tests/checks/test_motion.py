@@ -256,22 +256,32 @@ def test_a_velocity_along_the_nose_tells_no_front_left_up() -> None:
     assert "world" in found.told
 
 
-@pytest.mark.parametrize("written", ["body", "world", "inverse", "flu", "enu"])
-def test_velocities(written: str) -> None:
-    """A body velocity is read in the axes in which it was written."""
-    body = q4.turn_by(q4.inverse(TRUE.attitude), TRUE.velocity)
-    twice = q4.turn_by(TRUE.attitude, TRUE.velocity)
+@pytest.mark.parametrize("heading", [0.0, 0.7])
+@pytest.mark.parametrize("written", ["body", "world", "inverse", "flu", "level flu"])
+def test_velocities(written: str, heading: float) -> None:
+    """A body velocity is read in the axes in which it was written, whatever heading the stream's world has."""
+    own = q4.about_z(-heading)
+    lies, way = q4.product(own, TRUE.attitude), q4.turn_by(own, TRUE.velocity)
+    level = q4.about_z(q4.euler_from_quaternion(lies)[:, 2])
     given = {
-        "body": body,
-        "world": TRUE.velocity,
-        "inverse": twice,
-        "flu": body * [1, -1, -1],
-        "enu": TRUE.velocity[:, [1, 0, 2]] * [1, 1, -1],
+        "body": q4.turn_by(q4.inverse(lies), way),
+        "world": way,
+        "inverse": q4.turn_by(lies, way),
+        "flu": q4.turn_by(q4.inverse(lies), way) * [1, -1, -1],
+        "level flu": q4.turn_by(q4.inverse(level), way) * [1, -1, -1],
     }[written]
     stream = dataclasses.replace(TRUE, velocity=given)
+    found = twist.compare(stream, TRUE, TRUE, body=True, yaw=-heading, delay_s=0.0, rate=1.0)
+    assert isinstance(found, twist.Twist)
+    assert found.reading == ("labelled" if written == "body" else written)
+
+
+def test_a_velocity_in_east_north_up() -> None:
+    """A body velocity that was written in east, north, up."""
+    stream = dataclasses.replace(TRUE, velocity=TRUE.velocity[:, [1, 0, 2]] * [1, 1, -1])
     found = twist.compare(stream, TRUE, TRUE, body=True, yaw=0.0, delay_s=0.0, rate=1.0)
     assert isinstance(found, twist.Twist)
-    assert found.kind == ("labelled" if written == "body" else written)
+    assert found.kind == "enu"
 
 
 def enu(true: Series, k: int) -> dict[str, Any]:
