@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import re
 
-_SURROGATE = re.compile("[\ud800-\udfff]")
 _COMMAND = re.compile(r":(?=:)|#(?=#\w*\[)")
 """Where a line becomes a command to the machine that runs a CI job: ``::error::``, ``##vso[``."""
-_NOT_ASCII = re.compile("[\x7f-\U0010ffff]")
 _MARKDOWN = re.compile(r"[\\`*_{}\[\]()<>#|~!&@+-]|/(?=/)")
 
 
@@ -48,12 +46,12 @@ def markdown(text: str) -> str:
 
 def utf8(text: str) -> str:
     """Return `text` with what UTF-8 cannot hold (bytes of a non-UTF-8 file name) as escapes."""
-    return _SURROGATE.sub(lambda match: _escape(match[0]), text)
+    return text if text.isascii() else re.sub("[\ud800-\udfff]", lambda m: _escape(m[0]), text)
 
 
 def _ascii(document: bytes) -> bytes:
     text = document.decode()
-    return _NOT_ASCII.sub(lambda m: m[0] if m[0].isprintable() else _units(m[0]), text).encode()
+    return "".join(c if c.isprintable() or c < "\x7f" else _units(c) for c in text).encode()
 
 
 def _units(character: str) -> str:

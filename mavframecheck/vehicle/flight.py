@@ -21,7 +21,7 @@ from mavframecheck.vehicle.context import Context
 from mavframecheck.vehicle.facts import SOURCES as SAID
 from mavframecheck.vehicle.rows import Rows
 from mavframecheck.vehicle.thinning import MAX_BINS, Series, thinned
-from mavframecheck.vehicle.tracks import sources
+from mavframecheck.vehicle.tracks import source_of
 from mavframecheck.wire import Batch, Frames, Table
 
 Ints = npt.NDArray[np.int64]
@@ -216,7 +216,7 @@ def _heights(table: Table) -> Iterator[FieldTag]:
 def _height(rows: Rows, tag: FieldTag) -> Floats:
     """Return (n, 1) heights, m, upwards; NaN where there is none (0 above the ellipsoid: not given)."""
     height = np.asarray(rows.si(tag), np.float64) * (-1.0 if tag.positive == "down" else 1.0)
-    tracked = sources().get(tag.message)
+    tracked = source_of(tag.message)
     if tracked is not None and tracked.valid is not None:
         height = np.where(tracked.valid(rows.table), height, np.nan)
     if tag.alt_ref == "ellipsoid":

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.semantics import catalogue
+from mavframecheck.semantics.enums import Axis, Quantity
 from mavframecheck.semantics.tags import FieldTag
 from mavframecheck.wire import Batch, Place, Table
 
@@ -134,6 +135,8 @@ _BOOT_MS = _fields("time_boot_ms", scale=1e-3)
 
 NO_RATES = ("RAW_IMU", "SET_ATTITUDE_TARGET", "ATTITUDE_TARGET", "MANUAL_SETPOINT")
 """Rates without a unit, and rates that are asked for."""
+ROLLING = (Quantity.ANGULAR_RATE, Axis.FORWARD)
+_RATES = ("rollspeed", "pitchspeed", "yawspeed")
 
 _SOURCES: dict[str, Source] = {
     "GLOBAL_POSITION_INT": Source(
@@ -203,15 +206,25 @@ _SOURCES: dict[str, Source] = {
 }
 
 
-def _rates_by_tag() -> Iterator[tuple[str, Source]]:
-    """Yield every message that measures the turning of a body, by its tags, and how it says it."""
-    for first in catalogue.find(quantity="angular_rate", axis="forward"):
+@functools.cache
+def source_of(message: str) -> Source | None:
+    """Return how a message is followed; None where it says nothing of motion."""
+    known = _SOURCES.get(message)
+    rates = [] if message in NO_RATES else _rates(message)
+    if not rates:
+        return known
+    return (known or Source(variant=_instance(rates[0])))._replace(rates=_by_tags(rates))
+
+
+def _rates(message: str) -> list[FieldTag]:
+    """Return the tags by which a message measures the turning of a body, about three axes; none where it does not."""
+    ahead = (t for t in catalogue.tags(message) if (t.quantity, t.axis) == ROLLING)
+    for first in ahead:
         found = catalogue.partners(first)
-        rates = [found.get(name) for name in ("rollspeed", "pitchspeed", "yawspeed")]
-        if first.message not in NO_RATES and all(rates) and rates[0] is first:
-            known = _SOURCES.get(first.message, Source(variant=_instance(first)))
-            tags = [tag for tag in rates if tag is not None]
-            yield first.message, known._replace(rates=_by_tags(tags))
+        rates = [found[name] for name in _RATES if name in found]
+        if len(rates) == len(_RATES) and rates[0] is first:
+            return rates
+    return []
 
 
 def _instance(tag: FieldTag) -> tuple[str, ...]:
@@ -232,12 +245,6 @@ def _by_tags(tags: list[FieldTag]) -> Reader:
         return values
 
     return read
-
-
-@functools.cache
-def sources() -> dict[str, Source]:
-    """Return the messages that are followed."""
-    return _SOURCES | dict(_rates_by_tag())
 
 
 class TrackKey(NamedTuple):
@@ -340,9 +347,11 @@ class Tracks:
         if self.t0_us is None and frames.t_valid.any():
             self.t0_us = int(frames.t_us[np.argmax(frames.t_valid)])
             self.timed = True
-        for name in batch.tables.keys() & sources().keys():
+        for name in batch.tables:
+            source = source_of(name)
+            if source is None:
+                continue
             table = batch.tables[name]
-            source = sources()[name]
             good = table.frames.t_valid & (table.frames.t_us >= table.frames.clock_us - LATE_US)
             if source.valid is not None:
                 good &= source.valid(table)
@@ -354,8 +363,8 @@ class Tracks:
         if track is None:
             if len(self.tracks) >= MAX_TRACKS:
                 return
-            at = table.frames.place(0)
-            track = self.tracks[key] = Track(key, sources()[key.message], at, at)
+            source, at = source_of(key.message) or Source(), table.frames.place(0)
+            track = self.tracks[key] = Track(key, source, at, at)
         since = table.frames.t_us - (self.t0_us or 0)
         bins = np.maximum(since // BIN_US, 0)
         while int(bins.max()) // WINDOW_BINS >> self._level >= MAX_WINDOWS:

@@ -19,7 +19,7 @@ from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.tags import FieldTag
 from mavframecheck.vehicle import Context
-from mavframecheck.vehicle.tracks import ATTITUDE, PLACE, RATES, STAMP, TIME, Track, sources
+from mavframecheck.vehicle.tracks import ATTITUDE, PLACE, RATES, STAMP, TIME, Track
 from mavframecheck.wire import Batch, Dialect
 
 Floats = npt.NDArray[np.float64]
@@ -117,8 +117,7 @@ class Units(Check):
     def _turnings(self) -> list[tuple[Track, _Turning | str]]:
         """Return the rates in each stream beside the turns of its vehicle, or why they do not show."""
         if self._found is None and self._judge is not None:
-            measuring = [message for message, source in sources().items() if source.rates]
-            tracks = [t for message in measuring for t in self._judge.tracks_of(message)]
+            tracks = [track for track in self._judge.tracks if track.source.rates is not None]
             mine = [track for track in tracks if self.concerns_sender(track.key.sender)]
             self._found = [
                 (track, each) for track in mine for each in self._told(self._judge, track)

@@ -146,7 +146,12 @@ class Judge:
 
     def tracks_of(self, message: str) -> list[Track]:
         """Return the tracks of a message, of all senders."""
-        return [t for key, t in self._tracks.tracks.items() if key.message == message]
+        return [track for track in self.tracks if track.key.message == message]
+
+    @property
+    def tracks(self) -> list[Track]:
+        """All tracks, in the order in which they are first heard."""
+        return list(self._tracks.tracks.values())
 
     def role(self, sender: int) -> str:
         """Return what a sender is: ``autopilot``..."""
