@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import TYPE_CHECKING
 
 from mavframecheck.checks.missions.plans import Plans
@@ -108,8 +109,7 @@ def _judged(
         only=settings.sender,
         onlooker=onlooker,
     )
-    for batch in reading.batches(progress):
-        runner.update(batch)
+    deque(map(runner.update, reading.batches(progress)), maxlen=0)  # no batch outlives its turn
     return reading, runner
 
 

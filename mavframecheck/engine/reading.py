@@ -72,6 +72,7 @@ class Reading:
             yield batch
             if progress is not None and len(batch):
                 progress(int(batch.frames.offset[-1]))
+            del batch, admitted  # not in memory while the next one is read
         self._list(self._ranges.close())
 
     def understood(self, progress: Progress | None = None) -> Iterator[Batch]:

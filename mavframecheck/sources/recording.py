@@ -16,7 +16,7 @@ from mavframecheck.wire.chunk import Chunk, whole
 
 _STDIN_NAME = "<stdin>"
 BATCH_BYTES = 4 * 1024 * 1024
-"""How much MAVLink one batch of chunks holds, about 64k frames."""
+"""How much MAVLink one batch of chunks holds, about 100 000 frames."""
 
 
 class Recording:

@@ -214,11 +214,13 @@ class StampStream:
         frames, last = table.frames, self._before
         before = np.concatenate(([stamps[0] - 1 if last is None else last.stamp], stamps[:-1]))
         step = stamps - before
-        same, back = step == 0, np.flatnonzero(step < 0)
-        self.repeated += int(np.count_nonzero(same))
-        self.back += len(back)
-        self.late += int(np.count_nonzero(self._overtaken(frames, back)))
-        self._note(self.backs, frames, stamps, back)
+        same = step == 0
+        if step.min() <= 0:
+            back = np.flatnonzero(step < 0)
+            self.repeated += int(np.count_nonzero(same))
+            self.back += len(back)
+            self.late += int(np.count_nonzero(self._overtaken(frames, back)))
+            self._note(self.backs, frames, stamps, back)
         self._note(self.epochs, frames, stamps, self._new_epochs(before, stamps))
         self._stand(table, stamps, same)
 

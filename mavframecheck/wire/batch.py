@@ -10,7 +10,7 @@ import numpy as np
 from mavframecheck.model import Damage
 from mavframecheck.wire.chunk import Chunk
 from mavframecheck.wire.dialect import Dialect
-from mavframecheck.wire.frames import STX_V1, STX_V2, Bools, Frames, join
+from mavframecheck.wire.frames import Bools, Frames, are_magic, join
 from mavframecheck.wire.framing import Framer, Scan
 from mavframecheck.wire.table import Table, Tables
 
@@ -92,8 +92,7 @@ def _bounded(chunks: Iterable[list[Chunk]]) -> Iterator[list[Chunk]]:
 
 
 def _magic_bytes(data: bytes) -> int:
-    octets = np.frombuffer(data, np.uint8)
-    return int(np.count_nonzero(octets - np.uint8(STX_V2) <= STX_V1 - STX_V2))
+    return int(np.count_nonzero(are_magic(np.frombuffer(data, np.uint8))))
 
 
 def read_batches(
@@ -106,14 +105,14 @@ def read_batches(
     framers: dict[int, Framer] = {}
     first = clock_us = 0
     for group in _bounded(chunks):
-        scans = []
         for chunk in group:
-            framer = framers.setdefault(chunk.flow, Framer(dialect, stamped=stamped))
-            scans.append(framer.feed(chunk))
+            framers.setdefault(chunk.flow, Framer(dialect, stamped=stamped))
+        scans = [framers[chunk.flow].feed(chunk) for chunk in group]
         batch = batch_of(scans, dialect, first, clock_us)
         first += len(batch)
         clock_us = int(batch.frames.clock_us[-1]) if len(batch) else clock_us
         yield batch
+        del batch, scans  # not in memory while the next one is read
     if framers:
         scans = [framer.feed(None) for framer in framers.values()]
         yield batch_of(scans, dialect, first, clock_us)

@@ -18,6 +18,11 @@ Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 
+def are_magic(octets: npt.NDArray[np.uint8]) -> Bools:
+    """Return (n,) which of (n,) bytes may begin a frame: of all values only 0xFF is above both magic bytes."""
+    return np.asarray((octets >= STX_V2) & (octets != 0xFF))
+
+
 class Place(NamedTuple):
     """Where a frame, or a damaged range, is in the recording."""
 

@@ -36,6 +36,7 @@ from mavframecheck.wire.frames import (
     Bools,
     Frames,
     Ints,
+    are_magic,
 )
 from mavframecheck.wire.stamps import Stamps
 
@@ -71,9 +72,9 @@ class Framer:
 
     def feed(self, chunk: Chunk | None) -> Scan:
         """Return the frames that are certain once `chunk` has arrived; None ends the flow."""
-        joined = self._rest if chunk is None else _append(self._rest, chunk)
-        buffer = joined.data + PADDING
-        walk = _Walk(buffer, len(joined.data), self._dialect, self._gap, final=chunk is None)
+        joined = _padded(self._rest, chunk)
+        size = len(joined.data) - len(PADDING)
+        walk = _Walk(joined.data, size, self._dialect, self._gap, final=chunk is None)
         walk.run(self._lost)
         self._lost = walk.lost
         frames = self._frames(walk, joined)
@@ -82,7 +83,7 @@ class Framer:
             for first, last, reason in walk.skipped
         ]
         self._rest = _drop(joined, walk.done)
-        return Scan(buffer, frames, damage)
+        return Scan(joined.data, frames, damage)
 
     def _frames(self, walk: _Walk, chunk: Chunk) -> Frames:
         """Return the accepted candidates of `walk` with their headers, offsets and receive times."""
@@ -141,7 +142,7 @@ class _Candidates:
     """
 
     def __init__(self, octets: np.typing.NDArray[np.uint8], size: int, dialect: Dialect) -> None:
-        magic = np.flatnonzero((octets[:size] - np.uint8(STX_V2)) < 2)
+        magic = np.flatnonzero(are_magic(octets[:size]))
         plain = (octets[magic] != STX_V2) | (octets[magic + 2] <= SIGNED_FLAG)
         at = self.start = magic[plain]
         self.v2: Bools = octets[at] == STX_V2
@@ -378,14 +379,16 @@ def _next(starts: list[int], position: int) -> int | None:
     return starts[k] if k < len(starts) else None
 
 
-def _append(rest: Chunk, chunk: Chunk) -> Chunk:
-    """Return `rest` continued by `chunk`."""
+def _padded(rest: Chunk, chunk: Chunk | None) -> Chunk:
+    """Return `rest`, continued by `chunk` where there is one, and padding."""
+    if chunk is None:
+        return rest._replace(data=rest.data + PADDING)
     shift = len(rest.data)
     t_us = None
     if chunk.t_us is not None:
         t_us = chunk.t_us if rest.t_us is None else np.concatenate((rest.t_us, chunk.t_us))
     return Chunk(
-        rest.data + chunk.data,
+        b"".join((rest.data, chunk.data, PADDING)),
         np.concatenate((rest.starts, chunk.starts + shift)),
         np.concatenate((rest.offsets, chunk.offsets)),
         t_us,
@@ -393,15 +396,15 @@ def _append(rest: Chunk, chunk: Chunk) -> Chunk:
     )
 
 
-def _drop(chunk: Chunk, done: int) -> Chunk:
-    """Return what follows the first `done` bytes of `chunk`."""
-    first = max(int(np.searchsorted(chunk.starts, done, side="right")) - 1, 0)
-    starts, offsets = chunk.starts[first:] - done, chunk.offsets[first:].copy()
+def _drop(padded: Chunk, done: int) -> Chunk:
+    """Return what follows the first `done` bytes of a padded chunk, without the padding."""
+    first = max(int(np.searchsorted(padded.starts, done, side="right")) - 1, 0)
+    starts, offsets = padded.starts[first:] - done, padded.offsets[first:].copy()
     if len(starts) and starts[0] < 0:
         offsets[0] -= starts[0]
         starts[0] = 0
-    t_us = None if chunk.t_us is None else chunk.t_us[first:]
-    return Chunk(chunk.data[done:], starts, offsets, t_us, chunk.flow)
+    t_us = None if padded.t_us is None else padded.t_us[first:]
+    return Chunk(padded.data[done : -len(PADDING)], starts, offsets, t_us, padded.flow)
 
 
 def _offset_of(chunk: Chunk, position: int) -> int:
