@@ -25,6 +25,8 @@ Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 _SLOTS = 2**20 - 1
 """Keys that may be equal are told by this many slots: a table that fits into the cache."""
+_SPREAD = 0x9E3779B1
+"""Numbers times this differ in all bits (D. Knuth, The Art of Computer Programming, 6.4)."""
 
 
 class _Span:
@@ -284,13 +286,14 @@ class DuplicatedTraffic(Check):
         if not len(rows):
             return
         near = len(self._recent)
-        slots = np.concatenate((self._recent >> 24 & _SLOTS, _slots(frames, rows)))
-        some = np.flatnonzero(_shared(slots))
+        told = np.concatenate((self._recent >> 24, _told(frames, rows)))
+        numbers = np.concatenate((self._recent_number, frames.number[rows]))
+        some = np.flatnonzero(self._may_repeat(told, numbers))
         fresh = rows[some[some >= near] - near]
         keys = np.concatenate((self._recent[some[some < near]], _keys(frames, fresh)))
-        shared = _shared((keys ^ keys >> 20 ^ keys >> 37) & _SLOTS)
+        shared = self._may_repeat(keys ^ keys >> 20 ^ keys >> 37, numbers[some])
         some, keys = some[shared], keys[shared]
-        numbers = np.concatenate((self._recent_number, frames.number[rows]))[some]
+        numbers = numbers[some]
         order = np.argsort(keys, kind="stable")
         same = (np.diff(keys[order]) == 0) & (np.diff(numbers[order]) <= self.params["window"])
         again = some[order[1:][same]]
@@ -298,6 +301,18 @@ class DuplicatedTraffic(Check):
         repeated[rows[again[again >= near] - near]] = True
         self._count(frames, rows, repeated)
         self._remember(frames, rows)
+
+    def _may_repeat(self, told: Ints, numbers: Ints) -> Bools:
+        """Return (n,) all that occur again within the window, by a part of what tells frames apart, and few others.
+
+        The stream is cut in two ways into stretches of two windows: what is near lies in one stretch of either.
+        """
+        window = max(1, int(self.params["window"]))
+        near = np.zeros(len(told), np.bool_)
+        for shift in (0, window):
+            stretch = (numbers + shift) // (2 * window)
+            near |= _shared((told ^ stretch * _SPREAD) & _SLOTS)
+        return near
 
     def _remember(self, frames: Frames, rows: Ints) -> None:
         """Keep what the next frames may repeat."""
@@ -333,10 +348,9 @@ def _keys(frames: Frames, rows: Ints) -> Ints:
     return key | (frames.seq[rows].astype(np.int64) << 24) | (frames.msgid[rows] & 0xFFFFFF)
 
 
-def _slots(frames: Frames, rows: Ints) -> Ints:
+def _told(frames: Frames, rows: Ints) -> Ints:
     """Return (n,) the part of each key that tells most frames apart: checksum and sequence number."""
-    slot = frames.checksum[rows].astype(np.int64) << 8 | frames.seq[rows]
-    return slot & _SLOTS
+    return frames.checksum[rows].astype(np.int64) << 8 | frames.seq[rows]
 
 
 def _shared(slots: Ints) -> Bools:
