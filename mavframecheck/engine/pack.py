@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.resources
 import tomllib
 from collections.abc import Collection, Iterable, Sequence
@@ -23,13 +24,18 @@ def load_pack(directories: Sequence[Path] = ()) -> Pack:
 
     Raises `RuleFileError` when a file cannot be used or two rules share a code.
     """
-    packed = importlib.resources.files(__package__).joinpath(COMPILED).read_bytes()
-    shipped = msgspec.json.decode(packed, type=Pack)
+    shipped = _shipped()
     own = [read_rule(file) for folder in directories for file in rule_files(folder)]
     if not own:
         return shipped
     pack = _pack([*((rule, shipped.sources[rule.code]) for rule in shipped.rules), *own])
     return msgspec.structs.replace(pack, binds=shipped.binds, context=shipped.context)
+
+
+@functools.cache
+def _shipped() -> Pack:
+    packed = importlib.resources.files(__package__).joinpath(COMPILED).read_bytes()
+    return msgspec.json.decode(packed, type=Pack)
 
 
 def source_folder() -> Path:
