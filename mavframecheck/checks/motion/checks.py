@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mavframecheck.checks.base import Check, Observation, Verdict
+from mavframecheck.checks.base import Observation, Verdict
 from mavframecheck.checks.motion import attitude, axes, lever, twist
 from mavframecheck.checks.motion import judge as judging
 from mavframecheck.checks.motion.setpoints import OrderOfSetpoints
@@ -24,22 +24,11 @@ if TYPE_CHECKING:
 Values = dict[str, Scalar]
 
 
-class MotionCheck(Check):
+class MotionCheck(judging.Listener):
     """Asks the judge of the recording about every stream."""
 
     rotation = False
     """Whether a finding is about the attitude alone."""
-
-    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
-        """Listen with nothing heard so far."""
-        super().__init__(params, dialect)
-        self._judge: judging.Judge | None = None
-
-    def update(self, batch: Batch, context: Context) -> None:
-        """Let the judge that all these rules share hear a batch."""
-        self._judge = judging.Judge.of(context)
-        self._judge.only = self.only
-        self._judge.update(batch, context)
 
     def finish(self) -> Iterable[Observation]:
         """Return one observation for every stream in which the mistake is."""

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from mavframecheck.checks.base import Check, Observation, Verdict
+from mavframecheck.checks.base import Observation, Verdict
 from mavframecheck.checks.motion import attitude, response
 from mavframecheck.checks.motion.checks import lie_values
 from mavframecheck.checks.motion.holds import Holds
-from mavframecheck.checks.motion.judge import Judge, rate_of
+from mavframecheck.checks.motion.judge import Judge, Listener, rate_of
 from mavframecheck.checks.motion.response import Answer, Motion, Sample
 from mavframecheck.checks.motion.series import Series
 from mavframecheck.geo import quaternions as q4
@@ -39,21 +39,19 @@ _FIELDS = {
 }
 
 
-class Response(Check):
+class Response(Listener):
     """Setpoints of position, velocity, yaw and yaw rate, and the motion that followed."""
 
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Listen with nothing heard so far."""
         super().__init__(params, dialect)
-        self._judge: Judge | None = None
         self._holds = Holds()
         self._told: list[tuple[list[Sample], str, Answer | str]] | None = None
 
     def update(self, batch: Batch, context: Context) -> None:
         """Take in setpoints, and let the judge hear what the vehicle does."""
-        self._judge = Judge.of(context)
-        self._judge.update(batch, context)
-        if self._judge.t0_us is not None:
+        super().update(batch, context)
+        if self._judge is not None and self._judge.t0_us is not None:
             self._holds.update(batch, context, self._judge.t0_us)
 
     def finish(self) -> Iterable[Observation]:
@@ -163,19 +161,13 @@ def _values(what: str, answer: Answer) -> dict[str, Scalar]:
     }
 
 
-class AttitudeFrame(Check):
+class AttitudeFrame(Listener):
     """Attitudes that were asked for, and those that the vehicle took."""
 
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Listen with nothing heard so far."""
         super().__init__(params, dialect)
-        self._judge: Judge | None = None
         self._told: list[tuple[Track, attitude.Lie | str]] | None = None
-
-    def update(self, batch: Batch, context: Context) -> None:
-        """Let the judge hear a batch."""
-        self._judge = Judge.of(context)
-        self._judge.update(batch, context)
 
     def finish(self) -> Iterable[Observation]:
         """Return one observation for every stream that is taken in other axes."""

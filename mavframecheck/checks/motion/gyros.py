@@ -11,16 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Verdict
-from mavframecheck.checks.motion.judge import Judge
+from mavframecheck.checks.base import Observation, Verdict
+from mavframecheck.checks.motion.judge import Judge, Listener
 from mavframecheck.checks.motion.series import Series
 from mavframecheck.geo import quaternions as q4
 from mavframecheck.model import Scalar, Subject
 from mavframecheck.semantics import catalogue
 from mavframecheck.semantics.tags import FieldTag
-from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.tracks import ATTITUDE, PLACE, RATES, STAMP, TIME, Track
-from mavframecheck.wire import Batch, Dialect
+from mavframecheck.wire import Dialect
 
 Floats = npt.NDArray[np.float64]
 
@@ -67,19 +66,13 @@ class _Turning(NamedTuple):
         return best if off[best] < np.log(SAME) else ""
 
 
-class Units(Check):
+class Units(Listener):
     """Rates of gyroscopes and estimators that fit the turns of the vehicle in another unit only."""
 
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Listen with nothing heard so far."""
         super().__init__(params, dialect)
-        self._judge: Judge | None = None
         self._found: list[tuple[Track, _Turning | str]] | None = None
-
-    def update(self, batch: Batch, context: Context) -> None:
-        """Let the judge hear a batch."""
-        self._judge = Judge.of(context)
-        self._judge.update(batch, context)
 
     def finish(self) -> Iterable[Observation]:
         """Return one observation for every stream in another unit."""

@@ -9,19 +9,20 @@ from __future__ import annotations
 
 import functools
 import weakref
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.checks.base import Check
 from mavframecheck.checks.motion import attitude as attitudes
 from mavframecheck.checks.motion import axes, lever, twist
 from mavframecheck.checks.motion.series import Series, series_of
 from mavframecheck.semantics.constants import constant
 from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.tracks import Track, Tracks
-from mavframecheck.wire import Batch, Table
+from mavframecheck.wire import Batch, Dialect, Table
 
 if TYPE_CHECKING:
     from mavframecheck.model.trace import Figure
@@ -420,3 +421,18 @@ def _first_move(place: Series) -> float:
         return np.inf
     away = np.linalg.norm(where - where[0], axis=1) > 1.0
     return float(t[np.argmax(away)]) if away.any() else np.inf
+
+
+class Listener(Check):
+    """A check that asks the judge of the recording, which it lets hear every batch."""
+
+    def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
+        """Listen with nothing heard so far."""
+        super().__init__(params, dialect)
+        self._judge: Judge | None = None
+
+    def update(self, batch: Batch, context: Context) -> None:
+        """Let the judge that all these rules share hear a batch."""
+        self._judge = Judge.of(context)
+        self._judge.only = self.only
+        self._judge.update(batch, context)

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mavframecheck.checks.base import Check, Observation, Verdict
+from mavframecheck.checks.base import Observation, Verdict
 from mavframecheck.checks.motion import attitude, axes
-from mavframecheck.checks.motion.judge import Judge, frames
+from mavframecheck.checks.motion.judge import Judge, Listener, frames
 from mavframecheck.checks.motion.series import Floats
 from mavframecheck.geo import quaternions as q4
 from mavframecheck.model import Scalar, Subject
@@ -48,20 +48,19 @@ class _Compared(NamedTuple):
     rows: int
 
 
-class Representations(Check):
+class Representations(Listener):
     """ATTITUDE_QUATERNION and ODOMETRY of an autopilot, beside its ATTITUDE."""
 
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Listen with nothing heard so far."""
         super().__init__(params, dialect)
-        self._judge: Judge | None = None
         self._context: Context | None = None
         self._told: list[tuple[Track, _Compared | str]] | None = None
 
     def update(self, batch: Batch, context: Context) -> None:
         """Let the judge hear a batch."""
-        self._context, self._judge = context, Judge.of(context)
-        self._judge.update(batch, context)
+        super().update(batch, context)
+        self._context = context
 
     def finish(self) -> Iterable[Observation]:
         """Return one observation for every message that says another attitude."""

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.base import Check, Observation, Verdict
-from mavframecheck.checks.motion.judge import Judge
+from mavframecheck.checks.base import Observation, Verdict
+from mavframecheck.checks.motion.judge import Judge, Listener
 from mavframecheck.checks.motion.series import GAP_S, Series, thinned
 from mavframecheck.checks.standing import FrozenImages
 from mavframecheck.geo import quaternions as q4
@@ -64,20 +64,18 @@ class _Told(NamedTuple):
     """... and as it is said; or how far the vehicle turned meanwhile."""
 
 
-class StalePose(Check):
+class StalePose(Listener):
     """Headings of the vehicle, and places of images, that lag behind the vehicle."""
 
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Listen with nothing heard so far."""
         super().__init__(params, dialect)
-        self._judge: Judge | None = None
         self._images = FrozenImages({**params, "min_rows": params["min_images"]}, dialect)
         self._found: list[tuple[Track, _Told | str]] | None = None
 
     def update(self, batch: Batch, context: Context) -> None:
         """Let the judge hear a batch, and follow the images in it."""
-        self._judge = Judge.of(context)
-        self._judge.update(batch, context)
+        super().update(batch, context)
         self._images.only = self.only
         self._images.update(batch, context)
 

@@ -7,14 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mavframecheck.checks.base import Check, Observation, Verdict
-from mavframecheck.checks.motion.judge import Judge
+from mavframecheck.checks.base import Observation, Verdict
+from mavframecheck.checks.motion.judge import Judge, Listener
 from mavframecheck.checks.motion.series import Floats, Series
 from mavframecheck.geo import quaternions as q4
 from mavframecheck.model import Scalar, Subject
-from mavframecheck.vehicle import Context
 from mavframecheck.vehicle.tracks import Track
-from mavframecheck.wire import Batch, Dialect
+from mavframecheck.wire import Dialect
 
 MESSAGES = ("WIND", "WIND_COV")
 WINDOW_S = 60.0
@@ -49,19 +48,13 @@ class Window(NamedTuple):
         return float(abs(np.arctan2(cross, self.true @ self.said)))
 
 
-class WindDirection(Check):
+class WindDirection(Listener):
     """Winds that blow against the one that there is."""
 
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Listen with nothing heard so far."""
         super().__init__(params, dialect)
-        self._judge: Judge | None = None
         self._told: list[tuple[Track, list[Window]]] | None = None
-
-    def update(self, batch: Batch, context: Context) -> None:
-        """Let the judge hear a batch."""
-        self._judge = Judge.of(context)
-        self._judge.update(batch, context)
 
     def finish(self) -> Iterable[Observation]:
         """Return one observation for every sender whose wind is reversed."""
