@@ -12,6 +12,7 @@ from mavframecheck.cli.group import INTERRUPTED
 from mavframecheck.cli.interrupts import Interrupts
 from mavframecheck.cli.output import complain
 from mavframecheck.cli.progress import Progress
+from mavframecheck.engine.memory import keep_freed_memory
 from mavframecheck.report import Remark
 from mavframecheck.report.escape import sentence
 from mavframecheck.report.words import plural
@@ -46,6 +47,7 @@ class Files(Generic[Result]):
 
     def results(self) -> Iterator[Result]:
         """Yield what each file gives; Ctrl-C ends the list, and what is done is shown."""
+        keep_freed_memory()
         with Interrupts() as interrupts, closing(self.outcomes(self._files())) as outcomes:
             while True:
                 try:

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from multiprocessing.synchronize import Event
 from typing import Any
 
+from mavframecheck.engine.memory import keep_freed_memory
 from mavframecheck.sources import SourceError
 
 Read = Callable[..., Any]
@@ -76,6 +77,7 @@ def _begin(read: Read, stop: Event) -> None:
     """Take what all files of this process share."""
     global _given  # noqa: PLW0603  (a process pool has no other place)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    keep_freed_memory()
     _given = read, stop
 
 

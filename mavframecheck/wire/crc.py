@@ -23,14 +23,6 @@ LONGEST = 9 + 255 + 1 + WORD
 
 
 @functools.cache
-def _tail_masks() -> npt.NDArray[np.uint16]:
-    """(WORD + 1, WORD / 2) masks that keep all but the first n bytes of a word."""
-    kept = np.arange(WORD) >= np.arange(WORD + 1)[:, None]
-    masks: npt.NDArray[np.uint8] = np.where(kept, np.uint8(0xFF), np.uint8(0))
-    return masks.view("<u2")
-
-
-@functools.cache
 def _byte_table() -> npt.NDArray[np.uint16]:
     """(256,) what a byte in the low half of the register turns into after eight shifts."""
     table = np.arange(256, dtype=np.uint16)
@@ -113,18 +105,22 @@ def _crc16_of_sorted(
     lengths: npt.NDArray[np.int64],
     seeds: npt.NDArray[np.uint8],
 ) -> npt.NDArray[np.uint16]:
-    """Return the checksums of ranges in order of falling length, none in the first word of `buffer`."""
+    """Return the checksums of ranges in order of falling length, none in the first word of `buffer`.
+
+    Bytes are looked up in pairs from the end. A range of odd length takes the byte before it along, and
+    what that contributes is taken back.
+    """
     crc: npt.NDArray[np.uint16] = _start_values()[lengths + 1] ^ _distance_tables()[0][seeds]
+    odd = np.flatnonzero(lengths & 1)
+    crc[odd] ^= _distance_tables()[lengths[odd] + 1, buffer[starts[odd] - 1]]
     words = np.ndarray(len(buffer) - WORD + 1, f"V{WORD}", buffer, strides=(1,))
-    left, at = lengths, starts + lengths
-    distance = 1
-    while len(left) and left[0] > 0:
-        active = int(np.searchsorted(-left, 0, side="left"))
-        left, at = left[:active] - WORD, at[:active] - WORD
-        pairs = words[at].view("<u2").reshape(-1, WORD // 2)
-        short = int(np.searchsorted(-left, 0, side="right"))
-        pairs[short:] &= _tail_masks()[-left[short:]]
+    ends = starts + lengths - WORD
+    longer = np.searchsorted(-lengths, -np.arange(LONGEST)).tolist()
+    """By number of bytes: how many ranges are longer."""
+    for done in range(0, int(lengths[0]), WORD):
+        pairs = words[ends[: longer[done]] - done].view("<u2").reshape(-1, WORD // 2)
         for k in range(WORD // 2):
-            crc[:active] ^= _pair_table(distance + WORD - 2 - 2 * k).take(pairs[:, k])
-        distance += WORD
+            behind = done + WORD - 2 - 2 * k
+            active = longer[behind]
+            crc[:active] ^= _pair_table(1 + behind).take(pairs[:active, k])
     return crc
