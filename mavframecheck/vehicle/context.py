@@ -52,9 +52,9 @@ class Known(NamedTuple):
         """Return (n,) rows of a column of words whose word is `chosen`."""
         return np.array([chosen(label) for label in self.labels])[self.values]
 
-    def take(self, rows: Ints | Bools) -> Known:
+    def take(self, rows: Ints) -> Known:
         """Return the column for some of the rows."""
-        return Known(self.values[rows], self.known[rows], self.labels)
+        return Known(self.values.take(rows), self.known.take(rows), self.labels)
 
     def completed(self, later: Known) -> Known:
         """Return the column with what is unknown taken from `later`."""

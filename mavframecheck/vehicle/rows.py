@@ -19,6 +19,7 @@ from mavframecheck.semantics.references import selected_height
 from mavframecheck.semantics.tags import Condition, FieldTag, Sentinel
 from mavframecheck.vehicle.context import Context, Known
 from mavframecheck.wire import Table
+from mavframecheck.wire.frames import places_of
 from mavframecheck.wire.table import join as join_tables
 
 Bools = npt.NDArray[np.bool_]
@@ -46,8 +47,9 @@ class Rows:
 
     def take(self, rows: Ints | Bools) -> Rows:
         """Return some of the rows."""
-        taken = Rows(self.table.take(rows), self.source)
-        taken.known = {name: column.take(rows) for name, column in self.known.items()}
+        places = places_of(rows)
+        taken = Rows(self.table.take(places), self.source)
+        taken.known = {name: column.take(places) for name, column in self.known.items()}
         return taken
 
     def compact(self) -> Rows:

@@ -10,11 +10,11 @@ import numpy as np
 from mavframecheck.model import Damage
 from mavframecheck.wire.chunk import Chunk
 from mavframecheck.wire.dialect import Dialect
-from mavframecheck.wire.frames import Bools, Frames, are_magic, join
+from mavframecheck.wire.frames import STX_V2, Bools, Frames, are_magic, join
 from mavframecheck.wire.framing import Framer, Scan
 from mavframecheck.wire.table import Table, Tables
 
-MANY_MAGIC = 450_000
+MANY_MAGIC = 600_000
 SHORT = 1 << 18
 """Bytes of a chunk that is read in parts because it holds more magic bytes than that."""
 
@@ -82,7 +82,7 @@ def _bounded(chunks: Iterable[list[Chunk]]) -> Iterator[list[Chunk]]:
     """Cut a chunk that holds magic bytes by the hundred thousand: each is looked at as a frame."""
     for group in chunks:
         plain = len(group) == 1 and len(group[0].starts) == 1
-        if not plain or _magic_bytes(group[0].data) <= MANY_MAGIC:
+        if not plain or not _much_magic(group[0].data):
             yield group
             continue
         (chunk,) = group
@@ -91,8 +91,11 @@ def _bounded(chunks: Iterable[list[Chunk]]) -> Iterator[list[Chunk]]:
             yield [chunk._replace(data=part, offsets=chunk.offsets + at)]
 
 
-def _magic_bytes(data: bytes) -> int:
-    return int(np.count_nonzero(are_magic(np.frombuffer(data, np.uint8))))
+def _much_magic(data: bytes) -> bool:
+    """Return whether there is too much; a count that takes 0xFF along costs little and mostly settles it."""
+    octets = np.frombuffer(data, np.uint8)
+    at_most = np.count_nonzero(octets >= STX_V2)
+    return bool(at_most > MANY_MAGIC and np.count_nonzero(are_magic(octets)) > MANY_MAGIC)
 
 
 def read_batches(

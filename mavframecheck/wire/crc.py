@@ -13,6 +13,8 @@ import functools
 import numpy as np
 import numpy.typing as npt
 
+from mavframecheck.wire.windows import windows
+
 START = 0xFFFF
 FEW = 16
 """Up to this many ranges are checked one by one: that is faster than setting up the columns."""
@@ -113,7 +115,7 @@ def _crc16_of_sorted(
     crc: npt.NDArray[np.uint16] = _start_values()[lengths + 1] ^ _distance_tables()[0][seeds]
     odd = np.flatnonzero(lengths & 1)
     crc[odd] ^= _distance_tables()[lengths[odd] + 1, buffer[starts[odd] - 1]]
-    words = np.ndarray(len(buffer) - WORD + 1, f"V{WORD}", buffer, strides=(1,))
+    words = windows(buffer, f"V{WORD}")
     ends = starts + lengths - WORD
     longer = np.searchsorted(-lengths, -np.arange(LONGEST)).tolist()
     """By number of bytes: how many ranges are longer."""

@@ -75,14 +75,14 @@ class Frames:
         """Hold `columns` by name."""
         self.__dict__.update(columns)
         self._source: Frames | None = None
-        self._rows: Ints | Bools | slice = slice(None)
+        self._rows: Ints | slice = slice(None)
 
     def __getattr__(self, name: str) -> Any:
         """Take a column over from the frames that these were taken from."""
         source = self.__dict__.get("_source")
         if source is None or name not in COLUMNS:
             raise AttributeError(name)
-        column = self.__dict__[name] = getattr(source, name)[self._rows]
+        column = self.__dict__[name] = _picked(getattr(source, name), self._rows)
         return column
 
     def __len__(self) -> int:
@@ -92,7 +92,8 @@ class Frames:
     def take(self, rows: Ints | Bools | slice) -> Frames:
         """Return the frames at `rows`."""
         taken = Frames()
-        taken._source, taken._rows = self, rows
+        taken._source = self
+        taken._rows = rows if isinstance(rows, slice) else places_of(rows)
         return taken
 
     def place(self, row: int) -> Place:
@@ -108,7 +109,7 @@ class Frames:
     def sender(self) -> Ints:
         """(n,) system and component as one number: ``sysid * 256 + compid``."""
         if self._source is not None:
-            return self._source.sender[self._rows]
+            return _picked(self._source.sender, self._rows)
         sender: Ints = self.sysid.astype(np.int64) * 256 + self.compid
         return sender
 
@@ -116,6 +117,15 @@ class Frames:
     def good(self) -> Bools:
         """(n,) frames whose payload can be believed."""
         return self.crc_ok
+
+
+def places_of(rows: Ints | Bools) -> Ints:
+    """Return rows that are given by a mask as places, which several columns are taken at faster."""
+    return np.flatnonzero(rows) if rows.dtype == np.bool_ else rows
+
+
+def _picked(column: npt.NDArray[Any], rows: Ints | slice) -> npt.NDArray[Any]:
+    return column[rows] if isinstance(rows, slice) else column.take(rows)
 
 
 COLUMNS = tuple(Frames.__annotations__)

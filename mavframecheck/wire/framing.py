@@ -39,6 +39,7 @@ from mavframecheck.wire.frames import (
     are_magic,
 )
 from mavframecheck.wire.stamps import Stamps
+from mavframecheck.wire.windows import windows
 
 PADDING = bytes(LONGEST_FRAME)
 """Zeros behind a buffer, so that a header or payload window may reach over its end."""
@@ -89,30 +90,31 @@ class Framer:
         """Return the accepted candidates of `walk` with their headers, offsets and receive times."""
         rows = np.concatenate([*walk.accepted, np.zeros(0, np.int64)])
         c, octets = walk.candidates, walk.octets
-        start = c.start[rows]
-        v2 = c.v2[rows]
+        start = c.start.take(rows)
+        v2 = c.v2.take(rows)
         piece = np.searchsorted(chunk.starts, start, side="right") - 1
         t_us, has_stamp = self._receive_times(walk, chunk, start, piece, rows)
+        length = c.length.take(rows)
         fields = start + np.where(v2, 4, 2)
-        payload = start + c.header[rows]
-        tail = payload + c.length[rows]
+        payload = start + c.header.take(rows)
+        tail = payload + length
         return Frames(
             start=start,
             payload=payload,
-            offset=chunk.offsets[piece] + start - chunk.starts[piece],
+            offset=start + (chunk.offsets - chunk.starts).take(piece),
             t_us=t_us,
             t_valid=self._stamps.valid(t_us, has_stamp),
-            sysid=octets[fields + 1],
-            compid=octets[fields + 2],
-            seq=octets[fields],
-            msgid=c.msgid[rows],
-            length=octets[start + 1],
-            size=c.end[rows] - start,
-            version=(v2 + np.uint8(1)).astype(np.uint8),
-            signed=c.signed[rows],
-            known=c.known[rows],
-            crc_ok=c.good[rows],
-            checksum=octets[tail] | octets[tail + 1].astype(np.uint16) << 8,
+            sysid=octets[1:].take(fields),
+            compid=octets[2:].take(fields),
+            seq=octets.take(fields),
+            msgid=c.msgid.take(rows),
+            length=length.astype(np.uint8),
+            size=c.end.take(rows) - start,
+            version=np.where(v2, np.uint8(2), np.uint8(1)),
+            signed=c.signed.take(rows),
+            known=c.known.take(rows),
+            crc_ok=c.good.take(rows),
+            checksum=octets.take(tail) | octets[1:].take(tail).astype(np.uint16) << 8,
             number=np.zeros(len(rows), np.int64),
             clock_us=np.zeros(len(rows), np.int64),
         )
@@ -128,8 +130,7 @@ class Framer:
         previous_end = np.concatenate(([0], walk.candidates.end[rows[:-1]])) if len(rows) else start
         has_stamp = start - STAMP >= previous_end
         at = np.where(has_stamp, start - STAMP, 0)
-        windows = np.ndarray(len(walk.octets) - STAMP + 1, ">u8", walk.octets, strides=(1,))
-        stamps = np.minimum(windows[at], np.uint64(2**63 - 1)).astype(np.int64)
+        stamps = np.minimum(windows(walk.octets, ">u8")[at], np.uint64(2**63 - 1)).astype(np.int64)
         return np.where(has_stamp, stamps, 0), has_stamp
 
 
@@ -143,19 +144,16 @@ class _Candidates:
 
     def __init__(self, octets: np.typing.NDArray[np.uint8], size: int, dialect: Dialect) -> None:
         magic = np.flatnonzero(are_magic(octets[:size]))
-        plain = (octets[magic] != STX_V2) | (octets[magic + 2] <= SIGNED_FLAG)
-        at = self.start = magic[plain]
-        self.v2: Bools = octets[at] == STX_V2
-        self.length: Ints = octets[at + 1].astype(np.int64)
+        plain = (octets.take(magic) != STX_V2) | (octets[2:].take(magic) <= SIGNED_FLAG)
+        at = self.start = magic.compress(plain)
+        head = windows(octets, f"V{HEADER_V2}")[at].view(np.uint8).reshape(-1, HEADER_V2)
+        self.v2: Bools = head[:, 0] == STX_V2
+        self.length: Ints = head[:, 1].astype(np.int64)
         self.header: Ints = np.where(self.v2, HEADER_V2, HEADER_V1)
-        self.signed: Bools = self.v2 & (octets[at + 2] == SIGNED_FLAG)
+        self.signed: Bools = self.v2 & (head[:, 2] == SIGNED_FLAG)
         self.end: Ints = at + self.length + self.header + CHECKSUM + SIGNATURE * self.signed
-        wide = (
-            octets[at + 7]
-            | octets[at + 8].astype(np.int32) << 8
-            | octets[at + 9].astype(np.int32) << 16
-        )
-        self.msgid = np.where(self.v2, wide, octets[at + 5].astype(np.int32))
+        narrow, low, middle, high = (head[:, place].astype(np.int32) for place in (5, 7, 8, 9))
+        self.msgid = np.where(self.v2, low | middle << 8 | high << 16, narrow)
         self.seeds = dialect.seeds(self.msgid)
         self.known: Bools = self.seeds >= 0
         self.whole: Bools = self.end <= size

@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.wire.dialect import Layout
-from mavframecheck.wire.frames import Bools, Frames, Ints
+from mavframecheck.wire.frames import Bools, Frames, Ints, places_of
 from mavframecheck.wire.frames import join as join_frames
+from mavframecheck.wire.windows import windows
 
 Column = npt.NDArray[Any]
 
@@ -77,8 +78,9 @@ class Table:
 
     def take(self, rows: Ints | Bools) -> Table:
         """Return a table of the rows at `rows`."""
-        whole = np.arange(len(self)) if self._picked is None else self._picked
-        return Table(self.layout, self.frames.take(rows), self._payloads, whole[rows])
+        places = places_of(rows)
+        picked = places if self._picked is None else self._picked.take(places)
+        return Table(self.layout, self.frames.take(places), self._payloads, picked)
 
     def only(self, holds: Bools) -> Table:
         """Return a table of the rows for which `holds`, (n,): itself where that is all of them."""
@@ -154,10 +156,8 @@ def _payloads(
 ) -> npt.NDArray[np.void]:
     """Return the payloads of `frames`, which hold one message, zero-extended: (n,) structured."""
     length = frames.length
-    windows = np.ndarray(len(buffer) - layout.length + 1, f"V{layout.length}", buffer, strides=(1,))
-    payloads = windows[frames.payload]
-    short = np.flatnonzero(length < layout.length)
-    if len(short):
+    payloads = windows(buffer, f"V{layout.length}")[frames.payload]
+    if (length < layout.length).any():
         octets = payloads.view(np.uint8).reshape(-1, layout.length)
-        octets[short] *= np.arange(layout.length, dtype=np.uint8) < length[short, None]
+        octets *= np.arange(layout.length, dtype=np.uint8) < length[:, None]
     return payloads.view(layout.dtype)
