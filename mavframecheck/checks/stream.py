@@ -23,10 +23,8 @@ MAX_IDS = 1000
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
-_SLOTS = 2**20 - 1
-"""Keys that may be equal are told by this many slots: a table that fits into the cache."""
-_SPREAD = 0x9E3779B1
-"""Numbers times this differ in all bits (D. Knuth, The Art of Computer Programming, 6.4)."""
+_SLOTS_PER_FRAME = 4
+"""Keys that may be equal are told by slots: enough of them that few other keys share one."""
 
 
 class _Span:
@@ -220,15 +218,14 @@ class LostFrames(Check):
     def _follow(self, sender: int, frames: Frames, rows: Ints) -> None:
         if sender not in self._last and len(self._last) >= MAX_COUNTERS:
             return
-        seq = frames.seq[rows].astype(np.int64)
-        before = np.concatenate(([self._last.get(sender, int(seq[0]) - 1)], seq[:-1]))
-        step = (seq - before) % 256
-        gap = (step > 1) & (step <= self.params["max_gap"])
-        self._backwards[sender] += int(
-            np.count_nonzero((step == 0) | (step > self.params["max_gap"]))
-        )
+        seq = frames.seq.take(rows)
+        before = self._last.get(sender, int(seq[0]) - 1)
+        step = np.diff(seq, prepend=np.uint8(before % 256))  # modulo 256, as they count
+        max_gap = min(self.params["max_gap"], 255)
+        gap = (step > 1) & (step <= max_gap)
+        self._backwards[sender] += int(np.count_nonzero((step == 0) | (step > max_gap)))
         self._received[sender] += len(rows)
-        self._lost[sender] += int((step[gap] - 1).sum())
+        self._lost[sender] += int(step[gap].sum()) - int(np.count_nonzero(gap))
         self._last[sender] = int(seq[-1])
         span = self._spans.setdefault(sender, _Span())
         if gap.any():
@@ -308,10 +305,11 @@ class DuplicatedTraffic(Check):
         The stream is cut in two ways into stretches of two windows: what is near lies in one stretch of either.
         """
         window = max(1, int(self.params["window"]))
+        slots = 1 << (2 * window * _SLOTS_PER_FRAME).bit_length()
+        since = numbers - (numbers[0] if len(numbers) else 0)
         near = np.zeros(len(told), np.bool_)
         for shift in (0, window):
-            stretch = (numbers + shift) // (2 * window)
-            near |= _shared((told ^ stretch * _SPREAD) & _SLOTS)
+            near |= _shared((since + shift) // (2 * window) * slots + (told & (slots - 1)))
         return near
 
     def _remember(self, frames: Frames, rows: Ints) -> None:
@@ -354,10 +352,11 @@ def _told(frames: Frames, rows: Ints) -> Ints:
 
 
 def _shared(slots: Ints) -> Bools:
-    """Return (n,) which of the numbers occur more than once."""
-    owner = np.zeros(_SLOTS + 1, np.int32)
+    """Return (n,) which of the numbers, small ones, occur more than once."""
+    size = int(slots.max(initial=0)) + 1
+    owner = np.empty(size, np.int32)
     places = np.arange(len(slots), dtype=np.int32)
     owner[slots] = places
-    twice = np.zeros(_SLOTS + 1, np.bool_)
-    twice[slots[owner[slots] != places]] = True
-    return twice[slots]
+    twice = np.zeros(size, np.bool_)
+    twice[slots[owner.take(slots) != places]] = True
+    return twice.take(slots)

@@ -305,13 +305,14 @@ class Context:
         if quantity not in WORDS:
             return values.astype(np.float64)
         words = self._words[quantity]
-        kinds, which = np.unique(values, return_inverse=True)
+        begins = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
+        kinds, which = np.unique(values[begins], return_inverse=True)
         places = []
         for kind in kinds.tolist():
             text = kind.decode("utf-8", "replace") if isinstance(kind, bytes) else kind
             full = len(words) >= MAX_WORDS and text not in words
             places.append(0 if full else words.setdefault(text, len(words)))
-        return np.array(places, np.float64)[which]
+        return np.repeat(np.array(places, np.float64)[which], np.diff(begins, append=len(values)))
 
     def last(self, name: str, system: int) -> Any:
         """Return the last value of a context name for one system, None when it is unknown."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from mavframecheck.semantics.names import family, mode_name
 from mavframecheck.vehicle import roles
-from mavframecheck.vehicle.history import Bools, Values
+from mavframecheck.vehicle.history import Bools, Ints, Values
 from mavframecheck.wire import Table
 
 SECOND_US = 1_000_000
@@ -65,30 +65,33 @@ def _placed(lat: str, lon: str) -> Callable[[Table], Bools]:
 
 
 def _families(table: Table) -> Values:
-    kinds, which = np.unique(_kind(table), return_inverse=True)
-    return np.array([family(k & 0xFF, k >> 8) for k in kinds.tolist()])[which]
+    return roles.of_each_kind(_kind(table), lambda kind: family(kind & 0xFF, kind >> 8))
 
 
 def _modes(table: Table) -> Values:
-    said = table["custom_mode"].astype(np.int64) << 16 | _kind(table)
-    modes, which = np.unique(said, return_inverse=True)
-    named = [mode_name(family(m & 0xFF, m >> 8 & 0xFF), m >> 16) for m in modes.tolist()]
-    return np.array(named)[which]
+    def mode(said: int) -> str:
+        return mode_name(family(said & 0xFF, said >> 8 & 0xFF), said >> 16)
+
+    return roles.of_each_kind(table["custom_mode"].astype(np.int64) << 16 | _kind(table), mode)
 
 
-def _kind(table: Table) -> Values:
+def _kind(table: Table) -> Ints:
     return table["type"].astype(np.int64) << 8 | table["autopilot"]
 
 
 def _is_autopilot(table: Table) -> Bools:
-    kinds, which = np.unique(_kind(table), return_inverse=True)
-    speaks = [roles.role_from_heartbeat(k >> 8, k & 0xFF) == "autopilot" for k in kinds.tolist()]
-    return np.array(speaks, np.bool_)[which]
+    def speaks(kind: int) -> bool:
+        return roles.role_from_heartbeat(kind >> 8, kind & 0xFF) == "autopilot"
+
+    return roles.of_each_kind(_kind(table), speaks)
 
 
 def _banner_version(table: Table) -> Values:
-    texts = table["text"].tolist()
-    return np.array([roles.version_from_banner(text) or np.nan for text in texts], float)
+    version = np.full(len(table), np.nan)
+    with_point = np.flatnonzero(np.char.find(table["text"], b".") > 0)
+    for row, text in zip(with_point.tolist(), table["text"][with_point].tolist(), strict=True):
+        version[row] = roles.version_from_banner(text) or np.nan
+    return version
 
 
 def _flight_sw_version(table: Table) -> Values:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import re
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -152,10 +153,14 @@ class RoleBook:
 
 def _roles_of(heartbeats: Table) -> Ints:
     """Return (n,) the role that each HEARTBEAT announces, as a place in ROLES."""
-    kind = heartbeats["type"].astype(np.int64) << 8 | heartbeats["autopilot"]
-    kinds, which = np.unique(kind, return_inverse=True)
-    names = [role_from_heartbeat(k >> 8, k & 0xFF) for k in kinds.tolist()]
-    return np.array([ROLES.index(name) for name in names], np.int64)[which]
+    kinds = heartbeats["type"].astype(np.int64) << 8 | heartbeats["autopilot"]
+    return of_each_kind(kinds, lambda k: ROLES.index(role_from_heartbeat(k >> 8, k & 0xFF)))
+
+
+def of_each_kind(kinds: Ints, says: Callable[[int], Any]) -> npt.NDArray[Any]:
+    """Return (n,) what a function says of each of the numbers (n,); asked once for each that occurs."""
+    occurring = np.unique(kinds)
+    return np.array([says(kind) for kind in occurring.tolist()])[np.searchsorted(occurring, kinds)]
 
 
 def version_number(major: int, minor: int, patch: int) -> int:

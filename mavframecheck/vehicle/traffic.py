@@ -57,12 +57,13 @@ class Traffic:
         """Count `frames`; return (n,) which of them are to be judged."""
         self._note_times(frames)
         rows = np.flatnonzero(frames.good)
-        slots = self._sender_slots(frames.sender[rows])
+        slots = self._sender_slots(frames.sender.take(rows))
         seen = slots >= 0
-        stream = slots.astype(np.int64) * len(self._names) + self._message_slot[frames.msgid[rows]]
+        message = self._message_slot.take(frames.msgid.take(rows))
+        stream = slots * np.int64(len(self._names)) + message
         seen &= self._admit_streams(np.where(seen, stream, 0), seen)
-        self._counts += np.bincount(stream[seen], minlength=len(self._counts))
-        self.refused += len(rows) - int(seen.sum())
+        self._counts += np.bincount(stream.compress(seen), minlength=len(self._counts))
+        self.refused += len(rows) - int(np.count_nonzero(seen))
         admitted = np.zeros(len(frames), np.bool_)
         admitted[rows[seen]] = True
         return admitted
@@ -75,7 +76,7 @@ class Traffic:
             self.t_last = high if self.t_last is None else max(self.t_last, high)
 
     def _sender_slots(self, senders: npt.NDArray[np.int64]) -> npt.NDArray[np.int32]:
-        slots = self._sender_slot[senders]
+        slots = self._sender_slot.take(senders)
         fresh = senders[slots < 0]
         if len(fresh) and len(self._senders) < MAX_SENDERS:
             new, first = np.unique(fresh, return_index=True)
@@ -86,13 +87,15 @@ class Traffic:
         return slots
 
     def _admit_streams(self, stream: npt.NDArray[np.int64], seen: Bools) -> Bools:
-        fresh = stream[seen & ~self._known[stream]]
+        known = self._known.take(stream)
+        fresh = stream[seen & ~known]
         if len(fresh) and self._streams < MAX_STREAMS:
             new, first = np.unique(fresh, return_index=True)
             taken = new[np.argsort(first)][: MAX_STREAMS - self._streams]
             self._known[taken] = True
             self._streams += len(taken)
-        return self._known[stream]
+            known = self._known.take(stream)
+        return known
 
     def streams(self) -> list[Stream]:
         """Return every admitted stream by sender and message name."""

@@ -121,7 +121,7 @@ class Frames:
 
 def places_of(rows: Ints | Bools) -> Ints:
     """Return rows that are given by a mask as places, which several columns are taken at faster."""
-    return np.flatnonzero(rows) if rows.dtype == np.bool_ else rows
+    return np.flatnonzero(rows) if rows.dtype == np.bool_ else np.asarray(rows, np.int64)
 
 
 def _picked(column: npt.NDArray[Any], rows: Ints | slice) -> npt.NDArray[Any]:
