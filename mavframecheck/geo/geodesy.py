@@ -34,11 +34,15 @@ def distance_m(
         beta1, beta2 = _reduced(lat1), _reduced(lat2)
         middle, half = (beta1 + beta2) / 2, (beta2 - beta1) / 2
         east = np.radians(np.subtract(lon2, lon1)) / 2
-        near = (np.sin(half) * np.cos(east)) ** 2 + (np.cos(middle) * np.sin(east)) ** 2
-        far = (np.cos(half) * np.cos(east)) ** 2 + (np.sin(middle) * np.sin(east)) ** 2
+        sin_east, cos_east = np.sin(east), np.cos(east)
+        sin_middle, cos_middle = np.sin(middle), np.cos(middle)
+        sin_half, cos_half = np.sin(half), np.cos(half)
+        near = (sin_half * cos_east) ** 2 + (cos_middle * sin_east) ** 2
+        far = (cos_half * cos_east) ** 2 + (sin_middle * sin_east) ** 2
         arc = 2 * np.arctan2(np.sqrt(near), np.sqrt(far))
-        shorter = (arc - np.sin(arc)) * _share((np.sin(middle) * np.cos(half)) ** 2, far)
-        shorter += (arc + np.sin(arc)) * _share((np.cos(middle) * np.sin(half)) ** 2, near)
+        bow = np.sin(arc)
+        shorter = (arc - bow) * _share((sin_middle * cos_half) ** 2, far)
+        shorter += (arc + bow) * _share((cos_middle * sin_half) ** 2, near)
         metres: Floats = np.asarray(SEMI_MAJOR_M * (arc - FLATTENING / 2 * shorter))
     return metres
 

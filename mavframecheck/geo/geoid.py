@@ -30,9 +30,10 @@ def undulation(lat_deg: npt.ArrayLike, lon_deg: npt.ArrayLike) -> Floats:
     lat, lon = np.broadcast_arrays(np.asarray(lat_deg, float), np.asarray(lon_deg, float))
     known = (np.abs(lat) <= 90) & np.isfinite(lon)
     y = (np.where(known, lat, 0.0) + 90) * STEPS
-    x = np.mod(np.where(known, lon, 0.0) + 180, 360) * STEPS
+    turns = np.where(known, lon, 0.0) / 360 + 0.5
+    x = (turns - np.floor(turns)) * COLUMNS
     row = np.minimum(y.astype(np.intp), ROWS - 2)
-    column = x.astype(np.intp)
+    column = np.minimum(x.astype(np.intp), COLUMNS - 1)
     return np.where(known, _between(row, column, y - row, x - column), np.nan)
 
 
@@ -40,15 +41,22 @@ def _between(
     row: npt.NDArray[np.intp], column: npt.NDArray[np.intp], y: Floats, x: Floats
 ) -> Floats:
     """Return metres at the fractions `y`, `x` (0 to 1) of the cells whose south-west corners are given."""
-    grid = _grid()
-    west, east = column % COLUMNS, (column + 1) % COLUMNS
-    south = grid[row, west] * (1 - x) + grid[row, east] * x
-    north = grid[row + 1, west] * (1 - x) + grid[row + 1, east] * x
+    grid = _closed_grid()
+    width = grid.shape[1]
+    points, corner = grid.reshape(-1), row * width + column
+    south = points.take(corner) * (1 - x) + points.take(corner + 1) * x
+    north = points.take(corner + width) * (1 - x) + points.take(corner + width + 1) * x
     metres: Floats = (south * (1 - y) + north * y) / 100
     return metres
 
 
 @cache
+def _closed_grid() -> npt.NDArray[np.int16]:
+    """Return the grid with its westernmost column once more at the end: every cell has four corners."""
+    heights = _grid()
+    return np.concatenate((heights, heights[:, :1]), axis=1)
+
+
 def _grid() -> npt.NDArray[np.int16]:
     """Return (ROWS, COLUMNS) cm, southernmost row first, westernmost column first."""
     deltas = np.frombuffer(zlib.decompress(DATA.read_bytes()), "<i2").reshape(ROWS, COLUMNS)

@@ -114,7 +114,8 @@ def _crc16_of_sorted(
     """
     crc: npt.NDArray[np.uint16] = _start_values()[lengths + 1] ^ _distance_tables()[0][seeds]
     odd = np.flatnonzero(lengths & 1)
-    crc[odd] ^= _distance_tables()[lengths[odd] + 1, buffer[starts[odd] - 1]]
+    before = buffer.take(starts.take(odd) - 1)
+    crc[odd] ^= _distance_tables().reshape(-1).take((lengths.take(odd) + 1) * 256 + before)
     words = windows(buffer, f"V{WORD}")
     ends = starts + lengths - WORD
     longer = np.searchsorted(-lengths, -np.arange(LONGEST)).tolist()

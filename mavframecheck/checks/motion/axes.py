@@ -160,17 +160,20 @@ def _moves(reference: Series) -> bool:
 def _steps(stream: Series, reference: Series, span_s: float) -> _Steps | Undecided:
     at, grid_s = grid(stream.t)
     moved = stream.steps(at, span_s)
+    heard = np.flatnonzero(np.isfinite(moved).all(axis=1))
+    at, moved = at[heard], moved[heard]
     tried: dict[int, _Steps] = {}
 
     def attempt(places: range) -> int | None:
         """Try delays by their place in `DELAYS_S`; return the one that explains most so far."""
         for k in places:
             if 0 <= k < len(DELAYS_S) and k not in tried:
-                went = reference.steps(at - DELAYS_S[k], span_s)
-                both, rows, there = _moving(moved, went)
-                if np.count_nonzero(there) * grid_s >= MIN_SECONDS:
-                    times, share = at[both][there], _explained(*rows)
-                    tried[k] = _Steps(*rows, times, grid_s, span_s, float(DELAYS_S[k]), share)
+                went = np.nan_to_num(reference.steps(at - DELAYS_S[k], span_s))
+                there = np.flatnonzero(np.linalg.norm(went, axis=1) > MIN_STEP_M)
+                if len(there) * grid_s >= MIN_SECONDS:
+                    rows = moved.take(there, axis=0), went.take(there, axis=0)
+                    delay_s, share = float(DELAYS_S[k]), _explained(*rows)
+                    tried[k] = _Steps(*rows, at[there], grid_s, span_s, delay_s, share)
         return max(tried, key=lambda k: tried[k].explained, default=None)
 
     near = attempt(range(0, len(DELAYS_S), _COARSE))
@@ -189,14 +192,6 @@ def grid(t: Floats) -> tuple[Floats, float]:
     """Return the times of samples, thinned evenly, and how far apart they are at the least, s."""
     grid_s = max(GRID_S, len(t) * SAMPLE_S / MAX_TIMES)
     return thinned(t, grid_s), grid_s
-
-
-def _moving(moved: Floats, went: Floats) -> tuple[Bools, tuple[Floats, Floats], Bools]:
-    """Return (n,) where both are known, the displacements where either is moving, and which those are."""
-    both: Bools = np.asarray(np.isfinite(moved).all(axis=1) & np.isfinite(went[:, :2]).all(axis=1))
-    a, b = moved[both], np.nan_to_num(went[both])
-    there: Bools = np.asarray(np.linalg.norm(b, axis=1) > MIN_STEP_M)
-    return both, (a[there], b[there]), there
 
 
 def _explained(moved: Floats, went: Floats) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -50,22 +51,21 @@ class Series:
 
     def places(self, at: Floats) -> Floats:
         """Return (k, 3) positions at times `at`, NaN across gaps and resets."""
-        t, place, torn = self._track
-        return _between(t, place, at, torn)
+        return self._path.at(at)
 
     @functools.cached_property
-    def _track(self) -> tuple[Floats, Floats, Bools]:
-        """Times and positions that are known, those behind each reset far away, and where resets are."""
+    def _path(self) -> _Lines:
+        """Positions that are known, those behind each reset far away."""
         given = np.isfinite(self.place[:, :2]).all(axis=1)
         place = self.place[given]
         torn = _resets(place)
         behind = np.concatenate(([0.0], np.cumsum(torn)))[: len(place)] * APART_M
-        return self.t[given], place + behind[:, np.newaxis], torn
+        return _Lines.through(self.t[given], place + behind[:, np.newaxis], torn)
 
     def velocities(self, at: Floats) -> Floats:
         """Return (k, 3) velocities at times `at`, NaN across gaps."""
         given = np.isfinite(self.velocity).all(axis=1)
-        return _between(self.t[given], self.velocity[given], at)
+        return _Lines.through(self.t[given], self.velocity[given]).at(at)
 
     def attitudes(self, at: Floats) -> Floats:
         """Return (k, 4) attitudes at times `at`, NaN across gaps."""
@@ -114,14 +114,37 @@ def _places_in(t: Floats, at: Floats) -> tuple[npt.NDArray[np.int64], Floats, Bo
     return k, np.clip(share, 0, 1), np.asarray(near)
 
 
-def _between(t: Floats, values: Floats, at: Floats, torn: Bools | None = None) -> Floats:
-    if len(t) < 2:
-        return np.full((len(at), values.shape[1]), np.nan)
-    k, share, near = _places_in(t, at)
-    if torn is not None:
-        near &= ~torn[k]
-    found = values[k] + share[:, np.newaxis] * (values[k + 1] - values[k])
-    return np.where(near[:, np.newaxis], found, np.nan)
+class _Lines(NamedTuple):
+    """Straight lines from each of n samples to the next one."""
+
+    t: Floats
+    """(n,) s, ascending."""
+    values: Floats
+    """(n, k)."""
+    rates: Floats
+    """(n - 1, k) change per second."""
+    near: Bools
+    """(n - 1,) whether anything is read between the two samples."""
+
+    @classmethod
+    def through(cls, t: Floats, values: Floats, torn: Bools | None = None) -> _Lines:
+        """Join samples that are near each other and not `torn` apart, (n - 1,)."""
+        apart = np.diff(t)
+        near = apart <= GAP_S
+        if torn is not None:
+            near &= ~torn
+        return cls(t, values, np.diff(values, axis=0) / np.maximum(apart, 1e-9)[:, np.newaxis], near)
+
+    def at(self, times: Floats) -> Floats:
+        """Return (m, k) values at times (m,), NaN where nothing is read."""
+        if len(self.t) < 2:
+            return np.full((len(times), self.values.shape[1]), np.nan)
+        before = np.searchsorted(self.t, times, side="right") - 1
+        before = np.clip(before, 0, len(self.t) - 2)
+        inside = (times >= self.t[0]) & (times <= self.t[-1]) & self.near.take(before)
+        since = (times - self.t.take(before))[:, np.newaxis]
+        found = self.values.take(before, axis=0) + since * self.rates.take(before, axis=0)
+        return np.where(inside[:, np.newaxis], found, np.nan)
 
 
 def _resets(place: Floats) -> Bools:
