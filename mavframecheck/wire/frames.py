@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ LONGEST_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
+Rows = TypeVar("Rows", int, Ints)
 
 
 def are_magic(octets: npt.NDArray[np.uint8]) -> Bools:
@@ -87,7 +88,10 @@ class Frames:
 
     def __len__(self) -> int:
         """Return the number of frames."""
-        return len(self.start)
+        if self._source is None:
+            return len(self.start)
+        rows = self._rows
+        return len(range(len(self._source))[rows] if isinstance(rows, slice) else rows)
 
     def take(self, rows: Ints | Bools | slice) -> Frames:
         """Return the frames at `rows`."""
@@ -97,13 +101,27 @@ class Frames:
         return taken
 
     def place(self, row: int) -> Place:
-        """Return where the frame at `row` is."""
-        t_us = int(self.t_us[row]) if self.t_valid[row] else None
-        return Place(int(self.number[row]), t_us, int(self.offset[row]), int(self.size[row]))
+        """Return where the frame at `row` is; a negative one counts from the end."""
+        whole, row = self._origin(row % len(self))
+        t_us = int(whole.t_us[row]) if whole.t_valid[row] else None
+        return Place(int(whole.number[row]), t_us, int(whole.offset[row]), int(whole.size[row]))
 
     def own(self) -> Frames:
         """Return the same frames without holding on to those they were taken from."""
-        return Frames(**{name: getattr(self, name).copy() for name in COLUMNS})
+        whole, rows = self._origin(np.arange(len(self)))
+        return Frames(**{name: getattr(whole, name).take(rows) for name in COLUMNS})
+
+    def _origin(self, rows: Rows) -> tuple[Frames, Rows]:
+        """Return the frames that hold the columns, and where `rows` are among them: few columns of few rows."""
+        frames = self
+        while frames._source is not None:
+            if isinstance(frames._rows, slice):
+                first, _, step = frames._rows.indices(len(frames._source))
+                rows = first + rows * step
+            else:
+                rows = frames._rows[rows]
+            frames = frames._source
+        return frames, rows
 
     @functools.cached_property
     def sender(self) -> Ints:

@@ -133,7 +133,9 @@ class _Lines(NamedTuple):
         near = apart <= GAP_S
         if torn is not None:
             near &= ~torn
-        return cls(t, values, np.diff(values, axis=0) / np.maximum(apart, 1e-9)[:, np.newaxis], near)
+        return cls(
+            t, values, np.diff(values, axis=0) / np.maximum(apart, 1e-9)[:, np.newaxis], near
+        )
 
     def at(self, times: Floats) -> Floats:
         """Return (m, k) values at times (m,), NaN where nothing is read."""
