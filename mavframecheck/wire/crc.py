@@ -1,8 +1,7 @@
 """CRC-16/MCRF4XX (the checksum of MAVLink) over many frames at once.
 
-The checksum is linear: that of a frame is the XOR of what each byte contributes by its distance from the
-end, and of what the start value 0xFFFF contributes by the length. Frames sorted by length are therefore
-checked together, one table look-up per two bytes and no loop over frames.
+Two bytes fill the register, so one table says what it becomes when two more are shifted in. Frames in order
+of falling length take this step together, those that have ended staying behind: no loop over frames.
 Source: MAVLink developer guide, "Packet Serialization"; CRC catalogue entry CRC-16/MCRF4XX.
 """
 
@@ -18,14 +17,14 @@ from mavframecheck.wire.windows import windows
 START = 0xFFFF
 FEW = 16
 """Up to this many ranges are checked one by one: that is faster than setting up the columns."""
-WORD = 16
-"""Bytes looked up from the buffer at once."""
-LONGEST = 9 + 255 + 1 + WORD
-"""Bytes that a checksum covers at most (header without magic, payload, seed), and a word of room."""
+WORD = 32
+"""Bytes taken from the buffer at once."""
+
+Registers = npt.NDArray[np.uint16]
 
 
 @functools.cache
-def _byte_table() -> npt.NDArray[np.uint16]:
+def _byte_table() -> Registers:
     """(256,) what a byte in the low half of the register turns into after eight shifts."""
     table = np.arange(256, dtype=np.uint16)
     for _ in range(8):
@@ -41,33 +40,14 @@ def _byte_list() -> list[int]:
 
 
 @functools.cache
-def _distance_tables() -> npt.NDArray[np.uint16]:
-    """(LONGEST, 256) contribution of a byte value followed by k further bytes."""
-    step = _byte_table()
-    tables = np.empty((LONGEST, 256), np.uint16)
-    tables[0] = step
-    for k in range(1, LONGEST):
-        tables[k] = step[tables[k - 1] & 0xFF] ^ (tables[k - 1] >> 8)
-    return tables
+def _pair_table() -> Registers:
+    """(65536,) what the whole register turns into after sixteen shifts."""
+    return _shifted(_shifted(np.arange(1 << 16, dtype=np.uint16)))
 
 
-@functools.cache
-def _pair_table(distance: int) -> npt.NDArray[np.uint16]:
-    """(65536,) contribution of two bytes, the second of which is followed by `distance` further bytes."""
-    tables = _distance_tables()
-    pairs: npt.NDArray[np.uint16] = np.bitwise_xor.outer(tables[distance], tables[distance + 1])
-    return pairs.reshape(-1)
-
-
-@functools.cache
-def _start_values() -> npt.NDArray[np.uint16]:
-    """(LONGEST + 1,) contribution of the start value to a checksum over n bytes."""
-    step = _byte_table()
-    values = np.empty(LONGEST + 1, np.uint16)
-    values[0] = START
-    for n in range(1, LONGEST + 1):
-        values[n] = step[values[n - 1] & 0xFF] ^ (values[n - 1] >> 8)
-    return values
+def _shifted(registers: Registers) -> Registers:
+    """Return registers after eight shifts."""
+    return _byte_table().take(registers & 0xFF) ^ (registers >> 8)
 
 
 def crc16(data: bytes) -> int:
@@ -84,20 +64,18 @@ def crc16_of_ranges(
     starts: npt.NDArray[np.int64],
     lengths: npt.NDArray[np.int64],
     seeds: npt.NDArray[np.uint8],
-) -> npt.NDArray[np.uint16]:
+) -> Registers:
     """Return the checksum of each ``buffer[start : start + length]`` followed by its seed byte.
 
-    `starts`, `lengths` and `seeds` are (n,); ranges are at most 264 long. Result (n,).
+    `starts`, `lengths` and `seeds` are (n,); at least `WORD` bytes lie behind every range. Result (n,).
     """
     result = np.empty(len(starts), np.uint16)
-    single = np.arange(len(starts)) if len(starts) <= FEW else np.flatnonzero(starts < WORD)
-    for row in single.tolist():
-        covered = buffer[starts[row] : starts[row] + lengths[row]]
-        result[row] = crc16(covered.tobytes() + bytes([seeds[row]]))
-    if len(single) < len(starts):
-        rows = np.flatnonzero(starts >= WORD) if len(single) else np.arange(len(starts))
-        rows = rows[np.argsort((LONGEST - lengths[rows]).astype(np.uint16), kind="stable")]
-        result[rows] = _crc16_of_sorted(buffer, starts[rows], lengths[rows], seeds[rows])
+    if len(starts) <= FEW:
+        for row, (start, length) in enumerate(zip(starts.tolist(), lengths.tolist(), strict=True)):
+            result[row] = crc16(buffer[start : start + length].tobytes() + bytes([seeds[row]]))
+        return result
+    rows = np.argsort((0xFFFF - lengths).astype(np.uint16), kind="stable")
+    result[rows] = _crc16_of_sorted(buffer, starts.take(rows), lengths.take(rows), seeds.take(rows))
     return result
 
 
@@ -106,24 +84,18 @@ def _crc16_of_sorted(
     starts: npt.NDArray[np.int64],
     lengths: npt.NDArray[np.int64],
     seeds: npt.NDArray[np.uint8],
-) -> npt.NDArray[np.uint16]:
-    """Return the checksums of ranges in order of falling length, none in the first word of `buffer`.
-
-    Bytes are looked up in pairs from the end. A range of odd length takes the byte before it along, and
-    what that contributes is taken back.
-    """
-    crc: npt.NDArray[np.uint16] = _start_values()[lengths + 1] ^ _distance_tables()[0][seeds]
-    odd = np.flatnonzero(lengths & 1)
-    before = buffer.take(starts.take(odd) - 1)
-    crc[odd] ^= _distance_tables().reshape(-1).take((lengths.take(odd) + 1) * 256 + before)
-    words = windows(buffer, f"V{WORD}")
-    ends = starts + lengths - WORD
-    longer = np.searchsorted(-lengths, -np.arange(LONGEST)).tolist()
-    """By number of bytes: how many ranges are longer."""
-    for done in range(0, int(lengths[0]), WORD):
-        pairs = words[ends[: longer[done]] - done].view("<u2").reshape(-1, WORD // 2)
+) -> Registers:
+    """Return the checksums of ranges in order of falling length."""
+    crc = np.full(len(starts), START, np.uint16)
+    words, table = windows(buffer, f"V{WORD}"), _pair_table()
+    as_long = np.searchsorted(-lengths, -np.arange(int(lengths[0]) + WORD), "right").tolist()
+    """By number of bytes: how many ranges have them."""
+    for done in range(0, int(lengths[0]) - 1, WORD):
+        pairs = words[starts[: as_long[done + 2]] + done].view("<u2").reshape(-1, WORD // 2)
         for k in range(WORD // 2):
-            behind = done + WORD - 2 - 2 * k
-            active = longer[behind]
-            crc[:active] ^= _pair_table(1 + behind).take(pairs[:active, k])
-    return crc
+            going = as_long[done + 2 * k + 2]
+            crc[:going] = table.take(crc[:going] ^ pairs[:going, k])
+    odd = np.flatnonzero(lengths & 1)
+    last = buffer.take(starts.take(odd) + lengths.take(odd) - 1)
+    crc[odd] = _shifted(crc[odd] ^ last)
+    return _shifted(crc ^ seeds)

@@ -42,7 +42,7 @@ from mavframecheck.wire.stamps import Stamps
 from mavframecheck.wire.windows import windows
 
 PADDING = bytes(LONGEST_FRAME)
-"""Zeros behind a buffer, so that a header or payload window may reach over its end."""
+"""Zeros behind a buffer, so that a window on a header, payload or checked word may reach over its end."""
 
 CHECKED_AT_ONCE = 1 << 14
 """Checksums computed together: their frames lie near each other, and a buffer of magic bytes asks for millions."""

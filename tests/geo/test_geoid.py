@@ -142,7 +142,9 @@ def test_shapes_broadcast() -> None:
 
 
 def test_nothing_is_read_before_the_first_call() -> None:
-    program = "from mavframecheck.geo import geoid; assert geoid._closed_grid.cache_info().currsize == 0"
+    program = (
+        "from mavframecheck.geo import geoid; assert geoid._closed_grid.cache_info().currsize == 0"
+    )
 
     subprocess.run([sys.executable, "-c", program], check=True)
 
