@@ -47,7 +47,8 @@ def _pair_table() -> Registers:
 
 def _shifted(registers: Registers) -> Registers:
     """Return registers after eight shifts."""
-    return _byte_table().take(registers & 0xFF) ^ (registers >> 8)
+    shifted: Registers = _byte_table()[registers & 0xFF] ^ (registers >> 8)
+    return shifted
 
 
 def crc16(data: bytes) -> int:
