@@ -284,7 +284,7 @@ class DuplicatedTraffic(Check):
             return
         near = len(self._recent)
         told = np.concatenate((self._recent >> 24, _told(frames, rows)))
-        numbers = np.concatenate((self._recent_number, frames.number[rows]))
+        numbers = np.concatenate((self._recent_number, frames.number.take(rows)))
         some = np.flatnonzero(self._may_repeat(told, numbers))
         fresh = rows[some[some >= near] - near]
         keys = np.concatenate((self._recent[some[some < near]], _keys(frames, fresh)))
@@ -294,9 +294,7 @@ class DuplicatedTraffic(Check):
         order = np.argsort(keys, kind="stable")
         same = (np.diff(keys[order]) == 0) & (np.diff(numbers[order]) <= self.params["window"])
         again = some[order[1:][same]]
-        repeated = np.zeros(len(frames), np.bool_)
-        repeated[rows[again[again >= near] - near]] = True
-        self._count(frames, rows, repeated)
+        self._count(frames, rows, rows[again[again >= near] - near])
         self._remember(frames, rows)
 
     def _may_repeat(self, told: Ints, numbers: Ints) -> Bools:
@@ -314,17 +312,20 @@ class DuplicatedTraffic(Check):
 
     def _remember(self, frames: Frames, rows: Ints) -> None:
         """Keep what the next frames may repeat."""
-        oldest = frames.number[-1] - self.params["window"]
-        near, kept = rows[frames.number[rows] > oldest], self._recent_number > oldest
-        self._recent = np.concatenate((self._recent[kept], _keys(frames, near)))
-        self._recent_number = np.concatenate((self._recent_number[kept], frames.number[near]))
+        oldest = int(frames.number[-1]) - self.params["window"]
+        rows = rows[np.searchsorted(rows, oldest + 1 - int(frames.number[0])) :]
+        kept = self._recent_number > oldest
+        self._recent = np.concatenate((self._recent[kept], _keys(frames, rows)))
+        self._recent_number = np.concatenate((self._recent_number[kept], frames.number[rows]))
 
-    def _count(self, frames: Frames, rows: Ints, repeated: Bools) -> None:
-        for sysid, count in enumerate(np.bincount(frames.sysid[rows]).tolist()):
+    def _count(self, frames: Frames, rows: Ints, repeated: Ints) -> None:
+        for sysid, count in enumerate(np.bincount(frames.sysid.take(rows)).tolist()):
             if count:
                 self._frames[sysid] += count
-        for sysid in np.flatnonzero(np.bincount(frames.sysid[repeated])).tolist():
-            mine = repeated & (frames.sysid == sysid)
+        systems = frames.sysid[repeated]
+        for sysid in np.unique(systems).tolist():
+            mine = np.zeros(len(frames), np.bool_)
+            mine[repeated[systems == sysid]] = True
             self._twice[sysid] += int(np.count_nonzero(mine))
             self._spans.setdefault(sysid, _Span()).add(frames, mine)
 
@@ -342,13 +343,13 @@ class DuplicatedTraffic(Check):
 
 def _keys(frames: Frames, rows: Ints) -> Ints:
     """Return (n,) sender, checksum, sequence number and message as one number."""
-    key = (frames.sender[rows] << 48) | (frames.checksum[rows].astype(np.int64) << 32)
-    return key | (frames.seq[rows].astype(np.int64) << 24) | (frames.msgid[rows] & 0xFFFFFF)
+    key = frames.sender.take(rows) << 24 | _told(frames, rows)
+    return key << 24 | (frames.msgid.take(rows) & 0xFFFFFF)
 
 
 def _told(frames: Frames, rows: Ints) -> Ints:
     """Return (n,) the part of each key that tells most frames apart: checksum and sequence number."""
-    return frames.checksum[rows].astype(np.int64) << 8 | frames.seq[rows]
+    return frames.checksum.take(rows).astype(np.int64) << 8 | frames.seq.take(rows)
 
 
 def _shared(slots: Ints) -> Bools:

@@ -102,7 +102,7 @@ class Frames:
 
     def place(self, row: int) -> Place:
         """Return where the frame at `row` is; a negative one counts from the end."""
-        whole, row = self._origin(row % len(self))
+        whole, row = self._origin(row if row >= 0 else row + len(self))
         t_us = int(whole.t_us[row]) if whole.t_valid[row] else None
         return Place(int(whole.number[row]), t_us, int(whole.offset[row]), int(whole.size[row]))
 
