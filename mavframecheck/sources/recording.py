@@ -15,8 +15,8 @@ from mavframecheck.sources.stream import ByteStream, NoRecordingError, SourceErr
 from mavframecheck.wire.chunk import Chunk, whole
 
 _STDIN_NAME = "<stdin>"
-BATCH_BYTES = 8 * 1024 * 1024
-"""How much MAVLink one batch of chunks holds, about 200 000 frames."""
+BATCH_BYTES = 12 * 1024 * 1024
+"""How much MAVLink one batch of chunks holds, about 300 000 frames."""
 
 
 class Recording:

@@ -59,6 +59,15 @@ class Source(NamedTuple):
     variant: tuple[str, ...] = ()
     """Fields that choose the frame, or the instance."""
 
+    def kept(self) -> Iterator[tuple[slice, Reader]]:
+        """Yield the columns of a sample that the message gives, besides the time, and what reads them."""
+        attitude = slice(ATTITUDE.start, ATTITUDE.stop - self.euler)
+        stamp = slice(STAMP, STAMP + 1)
+        readers = (self.stamp, self.place, self.attitude, self.velocity, self.rates)
+        for columns, reader in zip((stamp, PLACE, attitude, VELOCITY, RATES), readers, strict=True):
+            if reader is not None:
+                yield columns, reader
+
 
 def _fields(*names: str, scale: float = 1.0) -> Reader:
     return lambda table: np.column_stack([table[name] * scale for name in names])
@@ -298,29 +307,24 @@ class Track:
 
     def _joined(self) -> tuple[Ints, Floats]:
         if not self.parts:
-            return np.zeros(0, np.int64), np.zeros((0, COLUMNS))
+            return np.zeros(0, np.int64), np.zeros((0, 1))
         return np.concatenate(self.kept), np.concatenate(self.parts)
 
     def samples(self) -> Floats:
-        """Return (n, COLUMNS) all that is kept, in the order of time."""
-        return self._joined()[1]
+        """Return (n, COLUMNS) all that is kept, in the order of time; NaN where the message gives nothing."""
+        _, kept = self._joined()
+        rows = np.full((len(kept), COLUMNS), np.nan)
+        rows[:, TIME] = kept[:, 0]
+        at = 1
+        for columns, _ in self.source.kept():
+            width = columns.stop - columns.start
+            rows[:, columns], at = kept[:, at : at + width], at + width
+        return rows
 
 
 def _samples(source: Source, table: Table, t_s: Floats) -> Floats:
-    rows = np.full((len(table), COLUMNS), np.nan)
-    rows[:, TIME] = t_s
-    readers = (
-        (slice(STAMP, STAMP + 1), source.stamp),
-        (PLACE, source.place),
-        (ATTITUDE, source.attitude),
-        (VELOCITY, source.velocity),
-        (RATES, source.rates),
-    )
-    for columns, reader in readers:
-        if reader is not None:
-            values = reader(table)
-            rows[:, columns.start : columns.start + values.shape[1]] = values
-    return rows
+    """Return (n, k) the time, and the columns that the message gives: memory is for these alone."""
+    return np.column_stack([t_s, *(read(table) for _, read in source.kept())])
 
 
 class Tracks:

@@ -14,7 +14,7 @@ from mavframecheck.wire.frames import STX_V2, Bools, Frames, are_magic, join
 from mavframecheck.wire.framing import Framer, Scan
 from mavframecheck.wire.table import Table, Tables
 
-MANY_MAGIC = 600_000
+MANY_MAGIC = 900_000
 SHORT = 1 << 18
 """Bytes of a chunk that is read in parts because it holds more magic bytes than that."""
 
