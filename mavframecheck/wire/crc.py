@@ -19,6 +19,10 @@ FEW = 16
 """Up to this many ranges are checked one by one: that is faster than setting up the columns."""
 WORD = 32
 """Bytes taken from the buffer at once."""
+TOGETHER = 1 << 15
+"""Ranges that take steps together: neighbours, whose bytes and registers stay in the cache."""
+LONG = 64
+"""Few ranges are longer than this: they take their many steps by themselves."""
 
 Registers = npt.NDArray[np.uint16]
 
@@ -47,8 +51,13 @@ def _pair_table() -> Registers:
 
 def _shifted(registers: Registers) -> Registers:
     """Return registers after eight shifts."""
-    shifted: Registers = _byte_table()[registers & 0xFF] ^ (registers >> 8)
-    return shifted
+    return _looked_up(_byte_table(), registers & np.uint16(0xFF)) ^ (registers >> np.uint16(8))
+
+
+def _looked_up(table: Registers, places: Registers) -> Registers:
+    """Return a table at `places`, (n,), which lie in it: to wrap costs less than to make sure."""
+    found: Registers = table.take(places, mode="wrap")
+    return found
 
 
 def crc16(data: bytes) -> int:
@@ -75,8 +84,14 @@ def crc16_of_ranges(
         for row, (start, length) in enumerate(zip(starts.tolist(), lengths.tolist(), strict=True)):
             result[row] = crc16(buffer[start : start + length].tobytes() + bytes([seeds[row]]))
         return result
-    rows = np.argsort((0xFFFF - lengths).astype(np.uint16), kind="stable")
-    result[rows] = _crc16_of_sorted(buffer, starts.take(rows), lengths.take(rows), seeds.take(rows))
+    for alike in (np.flatnonzero(lengths > LONG), np.flatnonzero(lengths <= LONG)):
+        for first in range(0, len(alike), TOGETHER):
+            rows = alike[first : first + TOGETHER]
+            falling = np.argsort((0xFFFF - lengths.take(rows)).astype(np.uint16), kind="stable")
+            rows = rows.take(falling)
+            result[rows] = _crc16_of_sorted(
+                buffer, starts.take(rows), lengths.take(rows), seeds.take(rows)
+            )
     return result
 
 
@@ -95,7 +110,7 @@ def _crc16_of_sorted(
         pairs = words[starts[: as_long[done + 2]] + done].view("<u2").reshape(-1, WORD // 2)
         for k in range(WORD // 2):
             going = as_long[done + 2 * k + 2]
-            crc[:going] = table.take(crc[:going] ^ pairs[:going, k])
+            crc[:going] = _looked_up(table, crc[:going] ^ pairs[:going, k])
     odd = np.flatnonzero(lengths & 1)
     last = buffer.take(starts.take(odd) + lengths.take(odd) - 1)
     crc[odd] = _shifted(crc[odd] ^ last)

@@ -44,8 +44,8 @@ from mavframecheck.wire.windows import windows
 PADDING = bytes(LONGEST_FRAME)
 """Zeros behind a buffer, so that a window on a header, payload or checked word may reach over its end."""
 
-CHECKED_AT_ONCE = 1 << 14
-"""Checksums computed together: their frames lie near each other, and a buffer of magic bytes asks for millions."""
+CHECKED_AT_ONCE = 1 << 17
+"""Checksums computed together: few frames are long, but a buffer of magic bytes asks for millions."""
 NO_RECORD, STOP = -1, -2
 CUT_OFF = "the frame is cut off"
 """Why the end of a recording that was not closed holds no frame."""
