@@ -278,24 +278,25 @@ class DuplicatedTraffic(Check):
 
     def update(self, batch: Batch, _context: Context) -> None:
         """Look each frame up among those of the last `window` frames."""
-        frames = batch.frames
-        rows = np.flatnonzero(frames.crc_ok)
-        if not len(rows):
+        frames, near = batch.frames, len(self._recent)
+        if not frames.crc_ok.any():
             return
-        near = len(self._recent)
-        told = np.concatenate((self._recent >> 24, _told(frames, rows)))
-        numbers = np.concatenate((self._recent_number, frames.number.take(rows)))
-        some = np.flatnonzero(self._may_repeat(told, numbers))
-        fresh = rows[some[some >= near] - near]
-        keys = np.concatenate((self._recent[some[some < near]], _keys(frames, fresh)))
-        shared = self._may_repeat(keys ^ keys >> 20 ^ keys >> 37, numbers[some])
-        some, keys = some[shared], keys[shared]
-        numbers = numbers[some]
+        told = np.concatenate((self._recent >> 24, _told(frames)))
+        numbers = np.concatenate((self._recent_number, frames.number))
+        may_repeat = self._may_repeat(told, numbers)
+        may_repeat[near:] &= frames.crc_ok
+        some = np.flatnonzero(may_repeat)
+        numbers = numbers.take(some)
+        keys = np.concatenate(
+            (self._recent[some[some < near]], _keys(frames.take(some[some >= near] - near)))
+        )
+        shared = np.flatnonzero(self._may_repeat(keys ^ keys >> 20 ^ keys >> 37, numbers))
+        some, keys, numbers = some.take(shared), keys.take(shared), numbers.take(shared)
         order = np.argsort(keys, kind="stable")
         same = (np.diff(keys[order]) == 0) & (np.diff(numbers[order]) <= self.params["window"])
         again = some[order[1:][same]]
-        self._count(frames, rows, rows[again[again >= near] - near])
-        self._remember(frames, rows)
+        self._count(frames, again[again >= near] - near)
+        self._remember(frames)
 
     def _may_repeat(self, told: Ints, numbers: Ints) -> Bools:
         """Return (n,) all that occur again within the window, by a part of what tells frames apart, and few others.
@@ -310,16 +311,17 @@ class DuplicatedTraffic(Check):
             near |= _shared((since + shift) // (2 * window) * slots + (told & (slots - 1)))
         return near
 
-    def _remember(self, frames: Frames, rows: Ints) -> None:
+    def _remember(self, frames: Frames) -> None:
         """Keep what the next frames may repeat."""
         oldest = int(frames.number[-1]) - self.params["window"]
-        rows = rows[np.searchsorted(rows, oldest + 1 - int(frames.number[0])) :]
+        last = max(len(frames) - self.params["window"], 0)
+        ones = frames.take(last + np.flatnonzero(frames.crc_ok[last:]))
         kept = self._recent_number > oldest
-        self._recent = np.concatenate((self._recent[kept], _keys(frames, rows)))
-        self._recent_number = np.concatenate((self._recent_number[kept], frames.number[rows]))
+        self._recent = np.concatenate((self._recent[kept], _keys(ones)))
+        self._recent_number = np.concatenate((self._recent_number[kept], ones.number))
 
-    def _count(self, frames: Frames, rows: Ints, repeated: Ints) -> None:
-        for sysid, count in enumerate(np.bincount(frames.sysid.take(rows)).tolist()):
+    def _count(self, frames: Frames, repeated: Ints) -> None:
+        for sysid, count in enumerate(np.bincount(frames.sysid.compress(frames.crc_ok)).tolist()):
             if count:
                 self._frames[sysid] += count
         systems = frames.sysid[repeated]
@@ -341,15 +343,14 @@ class DuplicatedTraffic(Check):
         return Verdict(sum(self._frames.values()))
 
 
-def _keys(frames: Frames, rows: Ints) -> Ints:
+def _keys(frames: Frames) -> Ints:
     """Return (n,) sender, checksum, sequence number and message as one number."""
-    key = frames.sender.take(rows) << 24 | _told(frames, rows)
-    return key << 24 | (frames.msgid.take(rows) & 0xFFFFFF)
+    return (frames.sender << 24 | _told(frames)) << 24 | (frames.msgid & 0xFFFFFF)
 
 
-def _told(frames: Frames, rows: Ints) -> Ints:
+def _told(frames: Frames) -> Ints:
     """Return (n,) the part of each key that tells most frames apart: checksum and sequence number."""
-    return frames.checksum.take(rows).astype(np.int64) << 8 | frames.seq.take(rows)
+    return frames.checksum.astype(np.int64) << 8 | frames.seq
 
 
 def _shared(slots: Ints) -> Bools:

@@ -56,17 +56,14 @@ class Traffic:
     def admit(self, frames: Frames) -> Bools:
         """Count `frames`; return (n,) which of them are to be judged."""
         self._note_times(frames)
-        rows = np.flatnonzero(frames.good)
-        slots = self._sender_slots(frames.sender.take(rows))
-        seen = slots >= 0
-        message = self._message_slot.take(frames.msgid.take(rows))
-        stream = slots * np.int64(len(self._names)) + message
-        seen &= self._admit_streams(np.where(seen, stream, 0), seen)
+        slots = self._sender_slots(frames.sender, frames.good)
+        seen = frames.good & (slots >= 0)
+        message = self._message_slot.take(frames.msgid, mode="clip")
+        stream = np.where(seen, slots * np.int64(len(self._names)) + message, 0)
+        seen &= self._admit_streams(stream, seen)
         self._counts += np.bincount(stream.compress(seen), minlength=len(self._counts))
-        self.refused += len(rows) - int(np.count_nonzero(seen))
-        admitted = np.zeros(len(frames), np.bool_)
-        admitted[rows[seen]] = True
-        return admitted
+        self.refused += int(np.count_nonzero(frames.good)) - int(np.count_nonzero(seen))
+        return seen
 
     def _note_times(self, frames: Frames) -> None:
         t_us = frames.t_us[frames.t_valid]
@@ -75,9 +72,9 @@ class Traffic:
             self.t_first = low if self.t_first is None else min(self.t_first, low)
             self.t_last = high if self.t_last is None else max(self.t_last, high)
 
-    def _sender_slots(self, senders: npt.NDArray[np.int64]) -> npt.NDArray[np.int32]:
+    def _sender_slots(self, senders: npt.NDArray[np.int64], good: Bools) -> npt.NDArray[np.int32]:
         slots = self._sender_slot.take(senders)
-        fresh = senders[slots < 0]
+        fresh = senders[good & (slots < 0)]
         if len(fresh) and len(self._senders) < MAX_SENDERS:
             new, first = np.unique(fresh, return_index=True)
             for sender in new[np.argsort(first)].tolist()[: MAX_SENDERS - len(self._senders)]:
