@@ -58,6 +58,7 @@ class _Lazy(click.Group):
         """Run the command; as a process of its own (no `args`), also answer for its failures."""
         if args is None:
             gc.set_threshold(COLLECT_AFTER)
+            os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's: matrices here are small
             sys.excepthook = _internal_error
         return super().main(args, *rest, **extra)
 

@@ -23,7 +23,7 @@ from mavframecheck.model import (
     Severity,
     Subject,
 )
-from mavframecheck.wire import Frames
+from mavframecheck.wire import Frames, Place
 
 if TYPE_CHECKING:
     from mavframecheck.model.trace import Figure
@@ -41,15 +41,6 @@ Key: TypeAlias = tuple[str | int | None, ...]
 """Names an episode among all of a recording."""
 Locate = Callable[[int, str | None], MissionLocation]
 """Says where in a mission file a frame number, and a field of it, stand."""
-
-
-class Mark(NamedTuple):
-    """A frame in the recording."""
-
-    number: int
-    t_us: int | None
-    offset: int
-    size: int
 
 
 class Words(NamedTuple):
@@ -87,8 +78,8 @@ class Episode:
 
     rule: CompiledRule
     subject: Subject
-    first: Mark
-    last: Mark
+    first: Place
+    last: Place
     words: Words
     badness: float = 0.0
     count: int = 1
@@ -139,7 +130,9 @@ class Episodes:
         streams = self._streams.setdefault((rule.rule.code, message, label), {})
         judged = judged._replace(timeless=self._locate is not None)
         hits = np.flatnonzero(judged.hit)
-        fresh = [s for s in dict.fromkeys(judged.stream[hits].tolist()) if s not in streams]
+        named = judged.stream[hits]
+        begun = named[np.append(True, named[1:] != named[:-1])[: len(named)]].tolist()
+        fresh = [stream for stream in dict.fromkeys(begun) if stream not in streams]
         for stream in fresh[: MAX_STREAMS - len(streams)]:
             streams[stream] = _Stream()
         order = np.argsort(judged.stream, kind="stable")
@@ -220,7 +213,7 @@ def _add_run(
     length: int,
 ) -> None:
     """Add a run of hits, within `length` rows and after `right_before` right ones, to a stream's episodes."""
-    first, last = _mark(judged.frames, int(hits[0])), _mark(judged.frames, int(hits[-1]))
+    first, last = judged.frames.place(int(hits[0])), judged.frames.place(int(hits[-1]))
     worst = int(hits[np.argmax(judged.badness[hits])])
     badness = float(judged.badness[worst])
     current = stream.episodes[-1] if stream.episodes else None
@@ -253,18 +246,13 @@ def _add_run(
     )
 
 
-def _continues(episode: Episode, first: Mark, right_before: int) -> bool:
+def _continues(episode: Episode, first: Place, right_before: int) -> bool:
     """Return whether a hit belongs to `episode`: no right row in between, or no long time."""
     if right_before == 0:
         return True
     if episode.last.t_us is None or first.t_us is None:
         return True
     return abs(first.t_us - episode.last.t_us) <= GAP_US
-
-
-def _mark(frames: Frames, place: int) -> Mark:
-    t_us = int(frames.t_us[place]) if frames.t_valid[place] else None
-    return Mark(int(frames.number[place]), t_us, int(frames.offset[place]), int(frames.size[place]))
 
 
 def _finding(episode: Episode, file: str, locate: Locate | None) -> Finding:
@@ -311,15 +299,15 @@ def fingerprint(code: str, subject: Subject, item: str = "") -> str:
     return hashlib.sha256(words.encode()).hexdigest()[:16]
 
 
-def _seconds(mark: Mark) -> float | None:
-    return None if mark.t_us is None else mark.t_us * 1e-6
+def _seconds(place: Place) -> float | None:
+    return None if place.t_us is None else place.t_us * 1e-6
 
 
-def _utc(mark: Mark) -> str | None:
-    if mark.t_us is None:
+def _utc(place: Place) -> str | None:
+    if place.t_us is None:
         return None
     return (
-        datetime.fromtimestamp(mark.t_us * 1e-6, UTC)
+        datetime.fromtimestamp(place.t_us * 1e-6, UTC)
         .isoformat(timespec="milliseconds")
         .replace("+00:00", "Z")
     )

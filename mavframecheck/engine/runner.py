@@ -12,7 +12,7 @@ import numpy as np
 
 from mavframecheck.checks import Check, Observation, load_check
 from mavframecheck.engine.compiled import Binding, Choice, CompiledRule, bind
-from mavframecheck.engine.episodes import Bools, Episode, Episodes, Judged, Mark, Words
+from mavframecheck.engine.episodes import Bools, Episode, Episodes, Judged, Words
 from mavframecheck.engine.scope import RuleScope, ValueScope
 from mavframecheck.engine.template import Template, first_value, plain
 from mavframecheck.engine.waiting import Queue
@@ -402,8 +402,8 @@ def _episode(
     return Episode(
         rule=rule,
         subject=observation.subject,
-        first=Mark(*observation.first),
-        last=Mark(*observation.last),
+        first=observation.first,
+        last=observation.last,
         words=words._replace(evidence=evidence),
         count=observation.times,
         judged=observation.times,

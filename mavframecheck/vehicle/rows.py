@@ -37,6 +37,8 @@ class Rows:
         self.table = table
         self.known: dict[str, Known] = {}
         """Context columns looked up so far; each keeps what it has once found."""
+        self._asked: set[str] = set()
+        """Those looked up in this batch: asked again, it says the same."""
         self.source = context
         """Where context is looked up."""
         self._cache: dict[tuple[object, ...], Any] = {}
@@ -50,6 +52,7 @@ class Rows:
         places = places_of(rows)
         taken = Rows(self.table.take(places), self.source)
         taken.known = {name: column.take(places) for name, column in self.known.items()}
+        taken._asked = set(self._asked)
         return taken
 
     def compact(self) -> Rows:
@@ -63,15 +66,17 @@ class Rows:
         found = self.known.get(name)
         if found is None:
             found = self.known[name] = self.source.lookup(name, self.table)
+            self._asked.add(name)
         return found
 
     def refresh(self, names: Iterable[str]) -> None:
-        """Look up again what is unknown of the context columns called `names`."""
+        """Look up again what is unknown of the context columns called `names`, once in a batch."""
         for name in names:
             old = self.known.get(name)
-            if old is None or not old.known.all():
+            if old is None or (name not in self._asked and not old.known.all()):
                 new = self.source.lookup(name, self.table)
                 self.known[name] = new if old is None else old.completed(new)
+                self._asked.add(name)
 
     def complete(self, names: Iterable[str]) -> Bools:
         """Return (n,) rows of which all context columns called `names` are known."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from mavframecheck.checks.motion.series import Series, thinned
+from mavframecheck.checks.motion.series import Series, displacement, thinned
 from mavframecheck.geo import permutations
 from mavframecheck.geo.alignment import (
     Linear,
@@ -29,7 +30,8 @@ MAX_TIMES = 1500
 """At most so many times are compared, spread over all that is kept."""
 SAMPLE_S = 0.05
 """Samples of a track are no nearer to each other, s."""
-DELAYS_S: Floats = np.arange(-0.5, 2.01, 0.05)
+DELAY_STEP_S = 0.05
+DELAYS_S: Floats = np.arange(-0.5, 2.01, DELAY_STEP_S)
 """Delays that are tried, s: every `_COARSE`-th, then all around the best one."""
 _COARSE = 4
 _SHARP = 6
@@ -162,13 +164,19 @@ def _steps(stream: Series, reference: Series, span_s: float) -> _Steps | Undecid
     moved = stream.steps(at, span_s)
     heard = np.flatnonzero(np.isfinite(moved).all(axis=1))
     at, moved = at[heard], moved[heard]
-    tried: dict[int, _Steps] = {}
+    half, tried = round(span_s / 2 / DELAY_STEP_S), dict[int, _Steps]()
+
+    @functools.cache
+    def place(steps: int) -> Floats:
+        """Return where the reference was by so many steps of a delay before."""
+        return reference.places(at - steps * DELAY_STEP_S)
 
     def attempt(places: range) -> int | None:
         """Try delays by their place in `DELAYS_S`; return the one that explains most so far."""
         for k in places:
             if 0 <= k < len(DELAYS_S) and k not in tried:
-                went = np.nan_to_num(reference.steps(at - DELAYS_S[k], span_s))
+                ago = round(float(DELAYS_S[k]) / DELAY_STEP_S)
+                went = np.nan_to_num(displacement(place(ago + half), place(ago - half)))
                 there = np.flatnonzero(np.linalg.norm(went, axis=1) > MIN_STEP_M)
                 if len(there) * grid_s >= MIN_SECONDS:
                     rows = moved.take(there, axis=0), went.take(there, axis=0)

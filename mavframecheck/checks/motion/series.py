@@ -84,9 +84,7 @@ class Series:
 
     def steps(self, at: Floats, span_s: float) -> Floats:
         """Return (k, 3) how far it went in the `span_s` around times `at`, m, NaN across gaps."""
-        went = self.places(at + span_s / 2) - self.places(at - span_s / 2)
-        level = np.abs(went[:, :2])  # heights may be unknown
-        return np.where(level.max(axis=1, keepdims=True) < APART_M / 2, went, np.nan)
+        return displacement(self.places(at - span_s / 2), self.places(at + span_s / 2))
 
     def integrated(self, rate: float) -> Series:
         """Return the same with a position that its velocity adds up to; `rate` is vehicle per receive time."""
@@ -97,6 +95,13 @@ class Series:
             dt = np.minimum(np.diff(t), GAP_S)[:, np.newaxis] * rate
             went[1:] = np.cumsum((v[1:] + v[:-1]) / 2 * dt, axis=0)
         return Series(self.message, t, went, self.attitude[given], v, self.stamp[given])
+
+
+def displacement(before: Floats, after: Floats) -> Floats:
+    """Return (n, 3) how far it is from one position to the other, m, NaN across resets."""
+    went = after - before
+    level = np.abs(went[:, :2])  # heights may be unknown
+    return np.where(level.max(axis=1, keepdims=True) < APART_M / 2, went, np.nan)
 
 
 def thinned(t: Floats, grid_s: float) -> Floats:
