@@ -100,8 +100,9 @@ class Series:
 def displacement(before: Floats, after: Floats) -> Floats:
     """Return (n, 3) how far it is from one position to the other, m, NaN across resets."""
     went = after - before
-    level = np.abs(went[:, :2])  # heights may be unknown
-    return np.where(level.max(axis=1, keepdims=True) < APART_M / 2, went, np.nan)
+    north, east = np.abs(went[:, 0]), np.abs(went[:, 1])  # heights may be unknown
+    went[~(np.maximum(north, east) < APART_M / 2)] = np.nan
+    return went
 
 
 def thinned(t: Floats, grid_s: float) -> Floats:
