@@ -222,6 +222,8 @@ def _no_items(frames: Frames) -> Items:
 
 def _last_of_each(items: Items) -> tuple[np.typing.NDArray[np.int64], tuple[int, ...]]:
     """Return the row of each `seq` that was sent last, and each `seq` that had another content before."""
+    if (np.diff(items.seq) > 0).all():
+        return np.arange(len(items)), ()
     backwards = items.seq[::-1]
     _, place, which = np.unique(backwards, return_index=True, return_inverse=True)
     last = len(items) - 1 - place
