@@ -55,7 +55,7 @@ samples: $(READY)  ## write samples/ again
 screenshots: $(READY)  ## the pictures of the HTML report in docs/images (needs chromium)
 	$(BIN)/python -m tools.screenshots
 
-bench: $(READY)  ## speed and memory against the required figures (about two minutes)
+bench: $(READY)  ## speed and memory against the required figures (about four minutes)
 	$(BIN)/python -m benchmarks.bench --corpus $(CORPUS)
 
 bench-link: $(READY)  ## a live link: latency, load, memory over an hour of flight (about three minutes)

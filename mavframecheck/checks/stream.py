@@ -269,6 +269,7 @@ class DuplicatedTraffic(Check):
     def __init__(self, params: Mapping[str, Any], dialect: Dialect) -> None:
         """Remember nothing yet."""
         super().__init__(params, dialect)
+        self._window = max(1, int(params["window"]))
         self._recent: Ints = np.zeros(0, np.int64)
         """Keys of the frames that are still near, and their numbers."""
         self._recent_number: Ints = np.zeros(0, np.int64)
@@ -293,7 +294,7 @@ class DuplicatedTraffic(Check):
         shared = np.flatnonzero(self._may_repeat(keys ^ keys >> 20 ^ keys >> 37, numbers))
         some, keys, numbers = some.take(shared), keys.take(shared), numbers.take(shared)
         order = np.argsort(keys, kind="stable")
-        same = (np.diff(keys[order]) == 0) & (np.diff(numbers[order]) <= self.params["window"])
+        same = (np.diff(keys[order]) == 0) & (np.diff(numbers[order]) <= self._window)
         again = some[order[1:][same]]
         self._count(frames, again[again >= near] - near)
         self._remember(frames)
@@ -303,18 +304,18 @@ class DuplicatedTraffic(Check):
 
         The stream is cut in two ways into stretches of two windows: what is near lies in one stretch of either.
         """
-        window = max(1, int(self.params["window"]))
-        slots = 1 << (2 * window * _SLOTS_PER_FRAME).bit_length()
+        slots = 1 << (2 * self._window * _SLOTS_PER_FRAME).bit_length()
         since = numbers - (numbers[0] if len(numbers) else 0)
         near = np.zeros(len(told), np.bool_)
-        for shift in (0, window):
-            near |= _shared((since + shift) // (2 * window) * slots + (told & (slots - 1)))
+        for shift in (0, self._window):
+            stretch = (since + shift) // (2 * self._window)
+            near |= _shared(stretch * slots + (told & (slots - 1)))
         return near
 
     def _remember(self, frames: Frames) -> None:
         """Keep what the next frames may repeat."""
-        oldest = int(frames.number[-1]) - self.params["window"]
-        last = max(len(frames) - self.params["window"], 0)
+        oldest = int(frames.number[-1]) - self._window
+        last = max(len(frames) - self._window, 0)
         ones = frames.take(last + np.flatnonzero(frames.crc_ok[last:]))
         kept = self._recent_number > oldest
         self._recent = np.concatenate((self._recent[kept], _keys(ones)))

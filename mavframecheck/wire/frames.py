@@ -16,7 +16,7 @@ LONGEST_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
 
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
-Rows = TypeVar("Rows", int, Ints)
+RowOrRows = TypeVar("RowOrRows", int, Ints)
 
 
 def are_magic(octets: npt.NDArray[np.uint8]) -> Bools:
@@ -111,7 +111,7 @@ class Frames:
         whole, rows = self._origin(np.arange(len(self)))
         return Frames(**{name: getattr(whole, name).take(rows) for name in COLUMNS})
 
-    def _origin(self, rows: Rows) -> tuple[Frames, Rows]:
+    def _origin(self, rows: RowOrRows) -> tuple[Frames, RowOrRows]:
         """Return the frames that hold the columns, and where `rows` are among them: few columns of few rows."""
         frames = self
         while frames._source is not None:
