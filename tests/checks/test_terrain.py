@@ -327,3 +327,12 @@ def test_in_a_recording() -> None:
     (finding,), _ = found(waypoints(5, z=100.0), Hill(lambda n: 488 + n / 2))
     assert finding.evidence["seq_to"] == 4
     assert finding.message_name == "MISSION_ITEM_INT"
+
+
+def test_home_that_moved_level() -> None:
+    """It was on the ridge first: its height is compared with the ground where it lies now."""
+    moved = Transfers().alive().home(488.0, north_deg=1000 * NORTH).home(488.0)
+    file = Recording("a.tlog", BytesIO(moved.upload(waypoints(5, z=100.0)).data), None)
+    report, findings = check_recording(file, PACK, Settings(), DIALECT, ground=Hill(ridge))
+    assert not findings
+    assert (report.runs[0].status, report.runs[0].checked) == ("ran", 4)

@@ -48,8 +48,9 @@ class Transfers:
     def alive(self, autopilot: int = 12, vehicle: Sender = VEHICLE) -> Transfers:
         return self.say("HEARTBEAT", vehicle, type=2, autopilot=autopilot)
 
-    def home(self, height_m: float) -> Transfers:
-        at = {"latitude": LAT, "longitude": LON, "altitude": round(height_m * 1e3)}
+    def home(self, height_m: float, north_deg: float = 0.0) -> Transfers:
+        lat = LAT + round(north_deg * 1e7)
+        at = {"latitude": lat, "longitude": LON, "altitude": round(height_m * 1e3)}
         return self.say("HOME_POSITION", VEHICLE, q=[1.0, 0, 0, 0], **at)
 
     def count(self, count: int, vehicle: Sender = VEHICLE, kind: int = 0) -> Transfers:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mavframecheck.checks.base import Check, Observation, Verdict
+from mavframecheck.geo.geodesy import distance_m
 from mavframecheck.missions import Items, Ledger, Mission, Readback, Transactions
 from mavframecheck.missions.held import ALL_KINDS
 from mavframecheck.model import Scalar, Subject
@@ -34,7 +35,7 @@ Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 MAX_HOMES = 500
-"""Heights of home that are remembered of one vehicle and source."""
+"""Homes that are remembered of one vehicle and source."""
 HOME_STEP_M = 5.0
 """Home moves less than this before arming, m."""
 MAX_MISSIONS = 200
@@ -100,8 +101,8 @@ class Plans:
         """Remember nothing yet."""
         self._transactions = Transactions()
         self._batch: weakref.ref[Batch] | None = None
-        self._homes: dict[int, _Heights] = {}
-        self._differences: dict[int, _Heights] = {}
+        self._homes: dict[int, _Homes] = {}
+        self._differences: dict[int, _Homes] = {}
         """Height minus height above home, for vehicles that never say where home is."""
         self._vehicles: dict[int, tuple[str, int]] = {}
         """System -> family and MAV_TYPE, as first said."""
@@ -331,18 +332,17 @@ class _Home(NamedTuple):
     lon: float
 
 
-class _Heights:
-    """Heights of home, where they changed, in frame order."""
+class _Homes:
+    """Homes, where they changed, in frame order."""
 
     def __init__(self) -> None:
         self._kept: list[_Home] = []
 
     def add(self, numbers: Ints, heights: Floats, places: Floats) -> None:
-        """Keep each height that differs by more than a step from the one kept before."""
+        """Keep each home that is more than a step away from the one kept before."""
         row = 0
         while len(self._kept) < MAX_HOMES:
-            last = self._kept[-1].height_m if self._kept else np.nan
-            changed = np.flatnonzero(~(np.abs(heights[row:] - last) < HOME_STEP_M))
+            changed = np.flatnonzero(self._away(heights[row:], places[row:]))
             if not len(changed):
                 return
             row += int(changed[0])
@@ -350,18 +350,27 @@ class _Heights:
             self._kept.append(_Home(int(numbers[row]), float(heights[row]), lat, lon))
             row += 1
 
+    def _away(self, heights: Floats, places: Floats) -> Bools:
+        """Return (n,) homes that are not the last one kept; a place that is not known moves nothing."""
+        if not self._kept:
+            return np.ones(len(heights), np.bool_)
+        last = self._kept[-1]
+        apart_m = distance_m(places[:, 0], places[:, 1], last.lat, last.lon)
+        level = np.abs(heights - last.height_m) < HOME_STEP_M
+        return np.asarray(~level | (apart_m >= HOME_STEP_M))
+
     def at(self, number: int) -> _Home | None:
         """Return what held at a frame, else the first one known."""
         before = bisect_right(self._kept, number, key=lambda kept: kept.number) - 1
         return self._kept[max(before, 0)] if self._kept else None
 
 
-def _remember(kept: dict[int, _Heights], table: Table, heights: Floats, places: Floats) -> None:
+def _remember(kept: dict[int, _Homes], table: Table, heights: Floats, places: Floats) -> None:
     """Keep (n,) heights and (n, 2) latitudes and longitudes of what each system says."""
     for sysid in np.unique(table.frames.sysid).tolist():
         rows = np.flatnonzero(table.frames.sysid == sysid)
         numbers = table.frames.number[rows].astype(np.int64)
-        kept.setdefault(sysid, _Heights()).add(numbers, heights[rows], places[rows])
+        kept.setdefault(sysid, _Homes()).add(numbers, heights[rows], places[rows])
 
 
 def _flown(beats: Table) -> Iterator[tuple[int, str, int]]:
