@@ -209,7 +209,7 @@ def _compared(count: int, rounds: np.ndarray) -> Iterator[Figure]:
         yield Figure(work.what, said, required, faster >= work.required)
 
 
-def start_to_end(path: Path, times: int = 7) -> Figure:
+def start_to_end(path: Path, times: int = 15) -> Figure:
     """Return (d): a whole process on a small log."""
     compileall.compile_dir(Path(mavframecheck.__file__).parent, quiet=1)  # as `pip install` does
     took = statistics.median(seconds(lambda: run_check(path)) for _ in range(times))
