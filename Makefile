@@ -58,7 +58,7 @@ screenshots: $(READY)  ## the pictures of the HTML report in docs/images (needs 
 bench: $(READY)  ## speed and memory against the required figures (about four minutes)
 	$(BIN)/python -m benchmarks.bench --corpus $(CORPUS)
 
-bench-link: $(READY)  ## a live link: latency, load, memory over an hour of flight (about three minutes)
+bench-link: $(READY)  ## a live link: latency, load, memory over two hours of flight (about three minutes)
 	$(BIN)/python -m benchmarks.link --corpus $(CORPUS)
 
 accuracy: $(READY)  ## labelled recordings: found, missed, false alarms; real ones: confirmed or not

@@ -2,7 +2,7 @@
 
 *Latency*: `watch` as a process on a UDP port, a flight sent to it over and over by a second process at
 5 000 messages a second, and now and then a message with a mistake, each by a component of its own: from
-sending it to reading the finding. *Load* and *memory*: the same engine fed with an hour of flight by
+sending it to reading the finding. *Load* and *memory*: the same engine fed with two hours of flight by
 batches of 100 ms at 10 000 messages a second, as fast as it goes.
 """
 
@@ -190,7 +190,7 @@ def rss_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
 
 
-def an_hour(path: Path, hours: float) -> tuple[list[tuple[float, float]], list[float], int]:
+def fly_on(path: Path, hours: float) -> tuple[list[tuple[float, float]], list[float], int]:
     """Return memory (hours of flight, MB), and how long each batch took (s), and all messages.
 
     The flight is flown faster than it was, so that its messages come at 10 000 a second.
@@ -225,16 +225,20 @@ def main() -> int:
     """Measure, print a table, and return 1 where a required figure is not met."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--corpus", type=Path, required=True)
-    parser.add_argument("--hours", type=float, default=1.0)
+    parser.add_argument("--hours", type=float, default=2.0)
     chosen = parser.parse_args()
     path = chosen.corpus / FLIGHT
     path = path if path.is_file() else SAMPLE
     late, rate = latencies(path)
-    memory, took, messages = an_hour(path, chosen.hours)
+    memory, took, messages = fly_on(path, chosen.hours)
     table = Table("figure", "measured", "required", "met")
     p50, p99 = np.percentile(late, [50, 99]) * 1e3
-    half = max(1, len(memory) // 2)
-    grown = max(mb for _, mb in memory[half:]) - max(mb for _, mb in memory[:half])
+    # What is kept of a flight is full within the first hour. Medians: while copies of the checks answer what
+    # they would say, a reading is 20 MB higher.
+    quarter = max(1, len(memory) // 4)
+    grown = float(np.median([mb for _, mb in memory[-quarter:]]))
+    grown -= float(np.median([mb for _, mb in memory[-2 * quarter : -quarter]]))
+    peak = max(mb for _, mb in memory)
     load = messages / sum(took)
     rows = [
         ("latency p50", f"{p50:.0f} ms at {rate:.0f} messages/s", "", True),
@@ -244,9 +248,9 @@ def main() -> int:
         ("processor time of a batch, p99", f"{np.percentile(took, 99) * 1e3:.0f} ms", "", True),
         (
             "memory",
-            f"{memory[-1][1]:.0f} MB, {grown:+.1f} MB in the second half",
-            "< 10 MB more",
-            grown < 10,
+            f"at most {peak:.0f} MB, {grown:+.1f} MB in the last quarter",
+            "< 5 MB more",
+            grown < 5,
         ),
     ]
     for what, measured, required, met in rows:
