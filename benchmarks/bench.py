@@ -173,9 +173,8 @@ WORKS = (
 )
 
 
-def took(place: int, path: Path) -> float:
-    """Return how long one of the works takes, s: the median of its times in a round."""
-    work = WORKS[place]
+def took(work: Work, path: Path) -> float:
+    """Return how long a work takes, s: the median of its times in a round."""
     return statistics.median(seconds(lambda: work.run(path)) for _ in range(work.times))
 
 
@@ -191,7 +190,7 @@ def speeds(path: Path) -> list[Figure]:
     with ExitStack() as opened:
         pools = [opened.enter_context(context.Pool(1)) for _ in WORKS]
         rounds = [
-            [pool.apply(took, (place, path)) for place, pool in enumerate(pools)]
+            [pool.apply(took, (work, path)) for pool, work in zip(pools, WORKS, strict=True)]
             for _ in range(ROUNDS)
         ]
     return list(_compared(count, np.array(rounds)))

@@ -19,6 +19,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import NamedTuple
 
@@ -81,9 +82,14 @@ class Flight:
                 row[name] += np.array(after_s * per_s).astype(row.dtype[name])
         sender = sent.sysid * 256 + sent.compid
         seq = self._seq[sender] = (self._seq.get(sender, -1) + 1) & 0xFF
-        version = 2 if sent.version == 2 else 1
-        who = {"sysid": sent.sysid, "compid": sent.compid, "seq": seq}
-        return encode_frame(layout, row.tobytes(), version=version, **who)  # type: ignore[arg-type]
+        return encode_frame(
+            layout,
+            row.tobytes(),
+            sysid=sent.sysid,
+            compid=sent.compid,
+            seq=seq,
+            version=2 if sent.version == 2 else 1,
+        )
 
 
 def _sent(data: bytes, dialect: Dialect) -> Iterator[Sent]:
@@ -115,7 +121,7 @@ def mistake(number: int, dialect: Dialect) -> bytes:
     return encode_frame(layout, payload, sysid=1, compid=FIRST_COMPONENT + number, seq=0)
 
 
-def fly(path: Path, port: int, rate: float, stop: object) -> None:
+def fly(path: Path, port: int, rate: float, stop: Event) -> None:
     """Send a flight over and over at `rate` messages a second."""
     flight, link = Flight(path), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     copies = range(math.ceil(LASTS_S * rate / len(flight.sent)))
@@ -123,7 +129,7 @@ def fly(path: Path, port: int, rate: float, stop: object) -> None:
     began = time.monotonic()
     for number, frame in enumerate(frames):
         if number % 10 == 0:
-            if stop.is_set():  # type: ignore[attr-defined]
+            if stop.is_set():
                 return
             time.sleep(max(0.0, began + number / rate - time.monotonic()))
         link.sendto(frame, ("127.0.0.1", port))

@@ -18,6 +18,7 @@ from mavframecheck.semantics.enums import AltRef, Axis
 from mavframecheck.semantics.references import selected_height
 from mavframecheck.semantics.tags import Condition, FieldTag, Sentinel
 from mavframecheck.vehicle.context import Context, Known
+from mavframecheck.vehicle.roles import of_each_kind
 from mavframecheck.wire import Table
 from mavframecheck.wire.frames import places_of
 from mavframecheck.wire.table import join as join_tables
@@ -187,12 +188,10 @@ class Rows:
         if tag.alt_ref not in (AltRef.BY_FRAME, AltRef.BY_FIELD):
             return np.full(len(self), str(tag.alt_ref))
         raw = np.nan_to_num(self.raw(tag.frame_field), nan=-1.0).astype(np.int64)
-        values, which = np.unique(raw, return_inverse=True)
         selectors = catalogue.tags_of(tag.message, tag.frame_field)
         same_view = (each for each in selectors if set(each.when) <= set(tag.when))
         enum = next((each.enum for each in same_view if each.enum), "MAV_FRAME")
-        words = [str(selected_height(enum, value)) for value in values.tolist()]
-        return np.array(words)[which.reshape(-1)]
+        return of_each_kind(raw, lambda value: str(selected_height(enum, value)))
 
     def present(self, field: str) -> Bools:
         """Return (n,) whether the sender gave the field."""

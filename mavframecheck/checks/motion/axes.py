@@ -164,7 +164,8 @@ def _steps(stream: Series, reference: Series, span_s: float) -> _Steps | Undecid
     moved = stream.steps(at, span_s)
     heard = np.flatnonzero(np.isfinite(moved).all(axis=1))
     at, moved = at[heard], moved[heard]
-    half, tried = round(span_s / 2 / DELAY_STEP_S), dict[int, _Steps]()
+    half = round(span_s / 2 / DELAY_STEP_S)
+    tried: dict[int, _Steps] = {}
 
     @functools.cache
     def place(steps: int) -> Floats:
